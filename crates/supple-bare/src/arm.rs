@@ -1,4 +1,4 @@
-//! An arm with N joints, oblique axes and full inertia tensors.
+//! An arm with N joints, of which every third has an oblique axis, and full inertia tensors.
 
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, ArmError, Body, Friction, Joint, Pose};
@@ -11,16 +11,16 @@ pub fn arm<const N: usize>() -> Result<Arm<N>, ArmError> {
         Vector3::new(0.6, 0.0, 0.8),
     ];
     let joints = core::array::from_fn(|i| {
-        let size = 1.0 / (1.0 + i as f64);
+        let scale = 1.0 / (1.0 + i as f64);
         Joint {
-            parent_from_link: Pose::from_xyz_rpy([0.05, -0.02, 0.3], [0.2, -0.1, 0.3 * size]),
+            parent_from_link: Pose::from_xyz_rpy([0.05, -0.02, 0.3], [0.2, -0.1, 0.3 * scale]),
             axis: axes[i % axes.len()],
             body: Body {
-                mass_kg: 4.0 * size,
+                mass_kg: 4.0 * scale,
                 com_m: Vector3::new(0.01, -0.02, 0.12),
                 inertia_kg_m2: Matrix3::new(
                     0.05, 0.002, -0.003, 0.002, 0.04, 0.001, -0.003, 0.001, 0.03,
-                ) * size,
+                ) * scale,
             },
             armature_kg_m2: 0.05,
         }

@@ -75,8 +75,8 @@ impl SocketCan {
         })
     }
 
-    /// Number of frames that were lost because they were not read in time, up to the last frame read. Each gap
-    /// is also reported as [`BusFault::Overrun`].
+    /// Number of frames that were lost because they were not read in time, as the kernel told with the last frame read: a loss after
+    /// it shows with the next frame. Each gap is also reported as [`BusFault::Overrun`].
     pub fn lost(&self) -> u64 {
         self.lost
     }

@@ -18,7 +18,7 @@ pub enum FrameFormat {
     Classic,
     /// CAN FD: at most 64 bytes.
     Fd {
-        /// The payload is sent at the higher bit rate.
+        /// The data phase is sent at the data bit rate (BRS).
         bit_rate_switch: bool,
     },
 }
@@ -29,7 +29,7 @@ pub struct CanFrame {
     id: CanId,
     format: FrameFormat,
     length: u8,
-    // Bytes from `length` on are zero, so that the derived equality ignores them.
+    // Bytes from `length` on are always zero, so that the derived equality compares the payload alone.
     bytes: [u8; MAX_FD_BYTES],
 }
 
@@ -49,7 +49,10 @@ impl fmt::Display for FrameError {
         match self {
             FrameError::Id(error) => write!(f, "{error}"),
             FrameError::TooLong(length) => {
-                write!(f, "payload has {length} bytes, a frame carries at most 8")
+                write!(
+                    f,
+                    "payload has {length} bytes, a classic frame carries at most 8"
+                )
             }
             FrameError::FdLength(length) => write!(
                 f,
@@ -88,7 +91,7 @@ impl CanFrame {
         CanFrame::new(CanId::standard(id)?, payload)
     }
 
-    /// An FD frame with `payload`, sent at the higher bit rate with `bit_rate_switch`.
+    /// An FD frame with `payload`; its data phase is sent at the data bit rate with `bit_rate_switch`.
     ///
     /// # Errors
     /// A length other than 0 to 8, 12, 16, 20, 24, 32, 48 or 64 bytes.

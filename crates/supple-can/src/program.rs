@@ -52,7 +52,7 @@ fn start(options: &Options) -> Result<Option<Counters>, RunError> {
         .iter()
         .filter(|_| !options.supervised())
     {
-        eprintln!("supple-can: warning: {warning}");
+        diagnostics::post(format_args!("supple-can: warning: {warning}"));
     }
     let mut backends = BACKENDS.iter();
     match backends.find(|backend| (backend.supports)(&description)) {

@@ -89,7 +89,7 @@ struct JsonError {
 const MESSAGE_CHARACTERS: usize = 4000;
 const KEPT_CHARACTERS: (usize, usize) = (2000, 500);
 
-/// A message that quotes no more of a file than somebody can read.
+/// A message without the middle of one that quotes a long file: its beginning and its end are kept.
 fn shortened(message: String) -> String {
     let characters = message.chars().count();
     if characters <= MESSAGE_CHARACTERS {

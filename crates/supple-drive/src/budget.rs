@@ -1,4 +1,4 @@
-//! Arithmetic of a period: every frame with its time on the bus, and the rate that follows.
+//! Timing budget of a control period: the longest time of each frame on the bus, other times, and the rate that follows.
 
 use core::fmt;
 use supple_can_frame::BitRates;
@@ -8,7 +8,7 @@ use supple_can_frame::timing::FrameLayout;
 pub const SPARE_SHARE: f64 = 0.2;
 
 const NS_PER_S: u64 = 1_000_000_000;
-/// Lines of a budget.
+/// Maximum number of lines of a budget.
 const LINES: usize = 8;
 
 /// Frames of one kind in a period, or a time that is not on the bus.
@@ -63,7 +63,7 @@ impl Budget {
     }
 
     /// Adds a time in which the bus is busy \[ns\].
-    pub fn bus_time(self, what: &'static str, each_ns: u64) -> Budget {
+    pub fn bus_busy_time(self, what: &'static str, each_ns: u64) -> Budget {
         self.line(BudgetLine {
             what,
             count: 1,
@@ -73,7 +73,7 @@ impl Budget {
     }
 
     /// Adds a time in which the bus is free \[ns\].
-    pub fn time(self, what: &'static str, each_ns: u64) -> Budget {
+    pub fn off_bus_time(self, what: &'static str, each_ns: u64) -> Budget {
         self.line(BudgetLine {
             what,
             count: 1,
@@ -83,10 +83,11 @@ impl Budget {
     }
 
     fn line(mut self, line: BudgetLine) -> Budget {
-        if line.count > 0
-            && let Some(slot) = self.lines.iter_mut().find(|slot| slot.is_none())
-        {
-            *slot = Some(line);
+        if line.count > 0 {
+            let slot = self.lines.iter_mut().find(|slot| slot.is_none());
+            // A line that is left out would make the period look long enough.
+            assert!(slot.is_some(), "a budget has at most {LINES} lines");
+            slot.into_iter().for_each(|slot| *slot = Some(line));
         }
         self
     }
@@ -126,22 +127,22 @@ impl Budget {
         NS_PER_S / self.min_period_ns().max(1)
     }
 
-    /// Largest rate of the usual ones \[Hz\] at which the bus is free for [`SPARE_SHARE`] of the period; `None` if there
+    /// Largest of the standard rates \[Hz\] at which the bus is free for [`SPARE_SHARE`] of the period; `None` if there
     /// is none.
     pub fn default_rate_hz(&self) -> Option<u32> {
-        const USUAL_HZ: [u32; 8] = [1000, 800, 500, 400, 250, 200, 125, 100];
+        const STANDARD_RATES_HZ: [u32; 8] = [1000, 800, 500, 400, 250, 200, 125, 100];
         let fits = |rate_hz: &u32| {
             let period_ns = NS_PER_S as f64 / f64::from(*rate_hz);
             let spare = self.bus_ns() as f64 <= (1.0 - SPARE_SHARE) * period_ns;
             spare && self.min_period_ns() as f64 <= period_ns
         };
-        USUAL_HZ.into_iter().find(fits)
+        STANDARD_RATES_HZ.into_iter().find(fits)
     }
 
     /// Rejects a period \[ns\] that is too short.
     ///
     /// # Errors
-    /// [`Overload`] with the times of all frames.
+    /// [`Overload`] with the times of all lines.
     pub fn check(&self, period_ns: u64) -> Result<(), Box<Overload>> {
         if self.min_period_ns() <= period_ns {
             return Ok(());
@@ -152,7 +153,7 @@ impl Budget {
         }))
     }
 
-    /// Text for a period \[ns\], whether it is long enough or not.
+    /// The budget as a table, for a period \[ns\] that may be too short.
     pub fn display(&self, period_ns: u64) -> impl fmt::Display {
         Table {
             budget: *self,

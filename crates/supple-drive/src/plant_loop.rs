@@ -71,7 +71,7 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         stow: Option<StowConfig<N>>,
     ) -> Result<PlantLoop<N, D, L>, Box<Overload>> {
         let budget = drive.budget();
-        let budget = budget.time("the controller's answer", cycle_config.answer_ns);
+        let budget = budget.off_bus_time("the controller's answer", cycle_config.answer_ns);
         budget.check(cycle_config.period_ns)?;
         let falls = drive.rest() == Rest::Falls;
         let stowing = stow.filter(|_| falls);

@@ -7,8 +7,9 @@ use supple_ipc::message::{self, ArmState, PlantReport, TorqueCommand};
 use supple_ipc::{IpcError, PlantLink};
 use supple_realtime::{Stop, pause};
 
-/// Poll intervals in virtual time for an answer (and shutdown), and for a controller to join.
+/// Poll interval in virtual time for an answer, and for a shutdown.
 const ANSWER_POLL_INTERVAL: Duration = Duration::from_millis(50);
+/// Poll interval for a controller to join, and time for an answer once the controller is lost.
 const JOIN_POLL_INTERVAL: Duration = Duration::from_millis(1);
 /// Polls without an answer after which the controller counts as lost in virtual time (2 s).
 const MAX_UNANSWERED_POLLS: u32 = 40;
@@ -17,22 +18,22 @@ const MAX_UNANSWERED_POLLS: u32 = 40;
 pub struct SharedMemoryLink {
     link: PlantLink,
     virtual_time: bool,
-    /// The last cycle in virtual time was not answered, so the next ones do not wait.
+    /// The last cycle in virtual time was not answered, so the next ones wait for a poll interval only.
     lost: bool,
     /// Number of commands for another arm.
-    unusable: u64,
+    wrong_arm: u64,
     stop: Stop,
 }
 
 impl SharedMemoryLink {
-    /// In real time an answer is awaited for as long as the cycle allows; in virtual time until it arrives, as bus
-    /// time does not advance meanwhile.
+    /// In real time an answer is awaited for as long as the cycle allows; in virtual time, which does not advance meanwhile, until it
+    /// arrives or the controller counts as lost after 2 s.
     pub fn new(link: PlantLink, virtual_time: bool, stop: Stop) -> SharedMemoryLink {
         SharedMemoryLink {
             link,
             virtual_time,
             lost: false,
-            unusable: 0,
+            wrong_arm: 0,
             stop,
         }
     }
@@ -41,7 +42,7 @@ impl SharedMemoryLink {
     fn read<const N: usize>(&mut self, command: &TorqueCommand) -> Option<Command<N>> {
         let torques = (command.torque::<N>(), command.fallback_torque::<N>());
         let (Ok(torque_nm), Ok(fallback_torque_nm)) = torques else {
-            self.unusable += 1;
+            self.wrong_arm += 1;
             return None;
         };
         Some(Command {
@@ -91,7 +92,7 @@ impl<const N: usize> Link<N> for SharedMemoryLink {
                 missed: counters.missed,
                 late: counters.late_answers,
                 foreign: self.link.foreign(),
-                unusable: self.unusable + counters.unusable,
+                unusable: self.wrong_arm + counters.unusable,
                 tx_lost: counters.tx_lost,
                 wake_ns: counters.wake_ns,
                 round_trip_ns: counters.round_trip_ns,

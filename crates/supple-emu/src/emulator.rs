@@ -30,7 +30,7 @@ pub enum ArmEvent {
     Safety(SafetyMode, crate::safety::Cause),
     /// A motor puck entered this mode.
     Motor(usize, MotorMode),
-    /// The host sent a frame while pucks were waking up, and went bus-off.
+    /// The host sent a frame while the transceiver of a waking puck was resetting, and went bus-off.
     HostSentDuringWakeUp,
 }
 
@@ -52,7 +52,7 @@ pub struct Emulator<const N: usize> {
     pending_fault: Option<BusFault>,
     random: Random,
     arm_events: Vec<(u64, ArmEvent)>,
-    /// Current offset of the machine's monotonic clock from the arm's time \[ns\].
+    /// CLOCK_MONOTONIC less the arm's time at present \[ns\].
     offset_ns: u64,
     /// That offset at each event \[ns\].
     event_offsets_ns: Vec<u64>,
@@ -66,13 +66,14 @@ pub struct Emulator<const N: usize> {
 }
 
 impl<const N: usize> Emulator<N> {
-    /// An arm at rest at `start_rad`, powered up in the emergency stop, at time `start_ns`. Transmission, amplifiers,
+    /// An arm at rest at `start_rad`, at time `start_ns`: in the emergency stop, with pucks without power, or if `config.zeroed` in
+    /// idle, with pucks that are awake and have the home pose. Transmission, amplifiers,
     /// braking and delays beyond the first cycle come from the plant's actuator model; counts and torque units from the
-    /// pucks. With an encoder bias the arm starts beside `start_rad` by as much.
+    /// pucks. The arm starts at `start_rad` less the bias of the encoders.
     ///
     /// # Errors
-    /// If the arm does not have 4 or 7 joints, no property ids are known for a puck's firmware, or the plant
-    /// rejects its configuration.
+    /// If the arm does not have 4 or 7 joints or a puck for each, its transmission is singular, no property ids are known for a
+    /// puck's firmware, or the plant rejects its configuration.
     pub fn new(
         config: EmulatorConfig,
         mut plant: PlantConfig<N>,
@@ -93,19 +94,20 @@ impl<const N: usize> Emulator<N> {
             .try_inverse()
             .ok_or(EmulatorError::Transmission)?;
         let step_s = config.step_ns as f64 * 1e-9;
-        // The bus itself takes the first cycle.
-        let late_s = plant.actuators.torque_delay_cycles.saturating_sub(1) as f64 * plant.cycle_s;
+        // The emulated bus delays torques by one cycle already.
+        let extra_delay_s =
+            plant.actuators.torque_delay_cycles.saturating_sub(1) as f64 * plant.cycle_s;
         plant.actuators = ActuatorModel {
             counts_per_motor_revolution: Vector::zeros(),
             motor_torque_quantum_nm: Vector::zeros(),
-            torque_delay_cycles: (late_s / step_s).round() as usize,
+            torque_delay_cycles: (extra_delay_s / step_s).round() as usize,
             ..plant.actuators
         };
         plant.step_s = step_s;
         plant.cycle_s = plant.step_s;
         // The bus has a jitter of its own.
         plant.cycle_jitter = 0.0;
-        // The host takes the start pose for its home pose; the zero is then off by this.
+        // The host zeroes the encoders as if the arm were in its home pose: the angles read are off by the bias.
         let start_rad = start_rad - plant.actuators.encoder_bias_rad;
         let mut pucks = Vec::with_capacity(N);
         for (index, puck) in config.pucks.iter().enumerate() {
@@ -261,19 +263,19 @@ impl<const N: usize> Emulator<N> {
         &self.arm_events
     }
 
-    /// All events so far, with their times by the machine's monotonic clock \[ns\].
-    pub fn events_in_wall_time(&self) -> impl Iterator<Item = (u64, ArmEvent)> {
+    /// All events so far, with their times by CLOCK_MONOTONIC \[ns\].
+    pub fn events_in_monotonic_time(&self) -> impl Iterator<Item = (u64, ArmEvent)> {
         let timed = self.arm_events.iter().zip(&self.event_offsets_ns);
         timed.map(|((time_ns, arm_event), offset_ns)| (time_ns + offset_ns, *arm_event))
     }
 
-    /// Sets the offset of the machine's monotonic clock from the arm's time \[ns\].
+    /// Sets the offset of CLOCK_MONOTONIC from the arm's time \[ns\].
     pub fn set_offset_ns(&mut self, offset_ns: u64) {
         self.offset_ns = offset_ns;
     }
 
-    /// Current time by the machine's monotonic clock \[ns\].
-    pub fn wall_ns(&self) -> u64 {
+    /// Current time by CLOCK_MONOTONIC \[ns\].
+    pub fn monotonic_ns(&self) -> u64 {
         self.now_ns + self.offset_ns
     }
 
@@ -293,11 +295,11 @@ impl<const N: usize> Emulator<N> {
         wire.min(self.next_tick_ns)
     }
 
-    /// Pauses the arm for `gap_ns`: advances its clock and the time of its next physics step by that much, without
-    /// motion, and discards all frames that wait for the bus.
+    /// Skips `gap_ns`: advances the clock and the time of the next physics step by that much, without motion, and discards all frames
+    /// that wait for the bus. Timeouts go on meanwhile: those of the safety module, of a wake-up and of the host's bus-off.
     pub fn shift_clock(&mut self, gap_ns: u64) {
         let now = self.now_ns + gap_ns;
-        self.wire.clear();
+        self.wire.pause(gap_ns);
         self.next_tick_ns += gap_ns;
         self.now_ns = now;
     }
@@ -398,8 +400,8 @@ impl<const N: usize> Emulator<N> {
         }
     }
 
-    /// Whether a puck's transceiver is switching off and on, so that the host must not send.
-    fn any_transceiver_off(&self) -> bool {
+    /// Whether the transceiver of a waking puck resets, so that the host must not send.
+    fn any_transceiver_resetting(&self) -> bool {
         self.pucks.iter().any(|puck| match puck.power() {
             Power::Waking(since_ns) => self.now_ns >= since_ns + self.config.transceiver_reset_ns,
             _ => false,
@@ -408,11 +410,12 @@ impl<const N: usize> Emulator<N> {
 
     /// A frame transmission is complete: delivers it to all other nodes. Returns the event for the host.
     fn deliver(&mut self, frame: CanFrame) -> Option<Event> {
-        // No node of the arm has other ids than those of its protocol.
-        let from_host = MessageId::of(&frame).is_none_or(|id| id.from() == NodeId::HOST);
-        if from_host && self.any_transceiver_off() {
+        let from_host = is_from_host(&frame);
+        if from_host && self.any_transceiver_resetting() {
             self.record(ArmEvent::HostSentDuringWakeUp);
             self.host_bus_off_until_ns = Some(self.now_ns + self.config.restart_ns);
+            // A controller that is bus-off sends none of the frames in its queue.
+            self.wire.discard(is_from_host);
             return Some(Event::Fault(BusFault::BusOff));
         }
         if !self.after_first_torque.is_empty() && from_host && commands_torque(&frame) {
@@ -490,6 +493,11 @@ fn commands_torque(frame: &CanFrame) -> bool {
     );
     let torques = PackedTorques::parse(frame);
     to_motors && torques.is_ok_and(|torques| torques.slots.iter().any(|t| t.units() != 0))
+}
+
+/// Whether the host sent the frame: no node of the arm has other ids than those of its protocol.
+fn is_from_host(frame: &CanFrame) -> bool {
+    MessageId::of(frame).is_none_or(|id| id.from() == NodeId::HOST)
 }
 
 impl<const N: usize> EmulatedNodes for Emulator<N> {

@@ -122,7 +122,7 @@ pub fn answer<const N: usize>(emulator: &mut Emulator<N>, line: &str) -> String 
     match line {
         "status" => json(&status(emulator)),
         "record" => {
-            let arm_events = emulator.events_in_wall_time();
+            let arm_events = emulator.events_in_monotonic_time();
             let entries = arm_events.map(|(time_ns, arm_event)| Entry {
                 time_ns,
                 what: match arm_event {
@@ -142,7 +142,7 @@ fn status<const N: usize>(emulator: &Emulator<N>) -> Status {
     let truth = emulator.truth();
     let pucks = emulator.pucks().iter();
     Status {
-        time_ns: emulator.wall_ns(),
+        time_ns: emulator.monotonic_ns(),
         safety_mode: format!("{:?}", emulator.safety().mode()),
         cause: format!("{:?}", emulator.safety().cause()),
         pendant: format!("{:?}", emulator.safety().pendant()),

@@ -56,7 +56,7 @@ fn start(options: &Options) -> Result<(), EmulatorError> {
         .iter()
         .filter(|_| !options.supervised())
     {
-        eprintln!("supple-emu: warning: {warning}");
+        diagnostics::post(format_args!("supple-emu: warning: {warning}"));
     }
     with_dof!(description.dof(), N => match description.bus() {
         Some(_) => crate::damiao::run::<N>(&description, options, &stop),
@@ -161,7 +161,7 @@ impl<const N: usize> Arm<N> {
             let arm = &mut self.emulator;
             let modes = arm.pucks().iter().map(Puck::mode);
             let sample = Sample {
-                time_ns: arm.wall_ns(),
+                time_ns: arm.monotonic_ns(),
                 active: modes.filter(|mode| *mode == MotorMode::Torque).count(),
                 torque_nm: arm.motor_torque_nm().into(),
                 mode: None,

@@ -74,9 +74,18 @@ impl Wire {
         }
     }
 
-    /// Discards all waiting frames.
-    pub fn clear(&mut self) {
+    /// Pauses for `gap_ns`: discards all waiting frames; a frame in transmission ends later by as much.
+    pub fn pause(&mut self, gap_ns: u64) {
         self.waiting.clear();
+        self.free_ns += gap_ns;
+        if let Some((_, end_ns)) = &mut self.current {
+            *end_ns += gap_ns;
+        }
+    }
+
+    /// Discards the waiting frames of which this is true.
+    pub fn discard(&mut self, is_discarded: impl Fn(&CanFrame) -> bool) {
+        self.waiting.retain(|waiting| !is_discarded(&waiting.frame));
     }
 
     /// Total time for which frames have occupied the bus \[ns\].
@@ -139,6 +148,21 @@ mod tests {
             Some(1000 + total)
         );
         assert_eq!(wire.busy_ns(), total);
+    }
+
+    #[test]
+    fn a_pause_discards_what_waits_and_lets_what_has_begun_end_later() {
+        let mut wire = Wire::new(BitRates::CLASSIC_1M);
+        wire.queue(0, frame(0x423, 3));
+        let end_ns = wire.next_end_ns().unwrap();
+        assert!(wire.advance(10).is_none());
+        wire.queue(20, frame(0x443, 3));
+        wire.pause(1_000_000);
+        assert_eq!(run(&mut wire), [(0x423, end_ns + 1_000_000)]);
+        wire.queue(0, frame(0x423, 3));
+        wire.queue(0, frame(0x443, 3));
+        wire.discard(|frame| frame.id().raw() == 0x423);
+        assert_eq!(run(&mut wire).len(), 1);
     }
 
     /// Barrett's 75 us for a position reply lies between no stuffing and the maximum.

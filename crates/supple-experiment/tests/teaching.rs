@@ -6,7 +6,7 @@ use supple_core::math::Vector3;
 use supple_core::{Controller, Vector};
 use supple_experiment::metrics::Rms;
 use supple_experiment::teaching::{
-    Points, Repetition, RepetitionError, Shown, read_points, time_waypoints,
+    Points, RecordedMotion, Repetition, RepetitionError, read_points, time_waypoints,
 };
 use supple_experiment::{Mismatch, Rig, Setup, Variant, approach_s, scenario, start_pose};
 use supple_model::Description;
@@ -91,8 +91,8 @@ impl Arm {
     }
 
     /// Lets it be guided, and returns what was shown.
-    fn teach(&mut self) -> Shown {
-        let mut shown = Shown::default();
+    fn teach(&mut self) -> RecordedMotion {
+        let mut shown = RecordedMotion::default();
         self.cycle(Some(Request::Float));
         for k in 0..21_500_u32 {
             let (_, mode, tip_m) = self.cycle(None);
@@ -107,7 +107,7 @@ impl Arm {
     }
 
     /// Repeats it; the error against what was shown, and the duration \[s\].
-    fn play(&mut self, shown: &Shown, repetition: &Repetition<N>) -> (Rms, f64) {
+    fn play(&mut self, shown: &RecordedMotion, repetition: &Repetition<N>) -> (Rms, f64) {
         let config = *self.controller.config();
         let duration_s = approach_s(&config, &self.position_rad, &repetition.start_rad);
         let target_rad = repetition.start_rad;
@@ -131,7 +131,7 @@ impl Arm {
             let (cycle, mode, tip_m) = self.cycle(request.map(|(request, _)| request));
             assert_eq!(mode, Mode::Track);
             if cycle >= start {
-                let shown_m = shown.tip_at(repetition.shown_s(start, cycle));
+                let shown_m = shown.tip_at(repetition.recorded_time_s(start, cycle));
                 error.add((tip_m - shown_m).norm());
             }
             if cycle == end + 300 {
@@ -163,7 +163,7 @@ fn twenty_seconds_shown_by_hand_are_repeated() {
             .join(name.replace(char::is_whitespace, "_").replace("/", "_"));
         let shown = arm.teach();
         shown.write(&file).expect("written");
-        let Ok(Points::Shown(shown)) = read_points(&file) else {
+        let Ok(Points::RecordedMotion(shown)) = read_points(&file) else {
             panic!("no motion");
         };
         assert!(
@@ -201,7 +201,7 @@ fn a_motion_beyond_the_limits_is_repeated_more_slowly_or_refused() {
     let start_m = arm.rig.plant().truth().tip_position_m;
     // A metre per second and more, on 0.3 m.
     let fast = |way_m: Vector3<f64>| {
-        let mut shown = Shown::default();
+        let mut shown = RecordedMotion::default();
         for k in 0..=60 {
             let share = f64::from(k) / 60.0;
             let smooth = share * share * (3.0 - 2.0 * share);
@@ -226,7 +226,7 @@ fn a_motion_beyond_the_limits_is_repeated_more_slowly_or_refused() {
         matches!(beyond, Err(RepetitionError::Refused { .. })),
         "{beyond:?}"
     );
-    let rest = Repetition::<N>::plan(&arm.controller, &Shown::default(), 1.0);
+    let rest = Repetition::<N>::plan(&arm.controller, &RecordedMotion::default(), 1.0);
     assert_eq!(rest, Err(RepetitionError::NoMotion));
 }
 

@@ -66,10 +66,10 @@ pub struct Procedure {
     pub friction: FrictionChoice,
     /// Whether to fit a rotor inertia for each moving joint; otherwise the nominal rotors are taken as known.
     pub rotor: bool,
-    /// Standard deviation of each rotor inertia before any motion, relative to that of the nominal arm; `None`: unknown.
+    /// Prior standard deviation of each rotor inertia, relative to that of the nominal arm; `None`: unknown.
     pub rotor_deviation: Option<f64>,
-    /// Samples of a joint slower than this are excluded from its rows \[rad/s\]; a Stribeck effect is then
-    /// fitted to them in a second stage.
+    /// Samples of a joint slower than this are excluded from its rows \[rad/s\]; if the friction columns
+    /// have a Stribeck effect, it is then fitted to them in a second stage.
     pub slow_rad_per_s: f64,
     /// Weight of the prior of a consistent fit, see [`crate::consistent::Constraints::prior_weight`];
     /// `None` chooses by cross-validation.
@@ -80,7 +80,7 @@ pub struct Procedure {
     /// Whether to estimate the delay of each log's torques ([`crate::estimate_delay`]) instead of taking that of
     /// `preparation`.
     pub estimate_delay: bool,
-    /// Whether to fit a log although [`crate::log_checks`] found it wrong; the findings are then warnings.
+    /// Whether to fit a log although [`crate::log_checks`] rejects it; the findings are then warnings.
     pub accept_wrong_logs: bool,
     /// Ends the identification early.
     pub cancellation: Cancellation,
@@ -112,7 +112,7 @@ impl Default for Procedure {
 /// Identifies an arm from one or several logs. Kinematics and undetermined parameters are those of `nominal`.
 ///
 /// # Errors
-/// A log that [`Log::check`] rejects; too little data; options out of range; singular data; [`IdentError::Cancelled`].
+/// A log that cannot be used, or [`IdentError::WrongLog`] with what was found; too little data; options out of range; singular data; [`IdentError::Cancelled`].
 pub fn identify<const N: usize>(
     nominal: &Arm<N>,
     logs: &[Log],
@@ -155,7 +155,7 @@ pub fn identify_motions<const N: usize>(
     Ok(found)
 }
 
-/// Median of the delays with which the motions were prepared; that of logs to validate.
+/// Upper median of the torque delays of the fitted motions, with which logs to validate are prepared.
 fn median_delay_s(motions: &[Motion]) -> f64 {
     let mut all: Vec<f64> = motions.iter().map(|m| m.torque_delay_s).collect();
     all.sort_by(f64::total_cmp);
@@ -163,8 +163,8 @@ fn median_delay_s(motions: &[Motion]) -> f64 {
 }
 
 impl Procedure {
-    /// Checks a log against the given arm ([`check_log`]) and prepares it. Samples that a finding concerns alone are left
-    /// out, with a warning.
+    /// Checks a log against the given arm ([`check_log`]) and prepares it. Intervals to which a finding is
+    /// limited are excluded, with a warning.
     ///
     /// # Errors
     /// As [`Motion::prepare`]; [`IdentError::WrongLog`] with everything that was found.
@@ -224,7 +224,7 @@ impl Procedure {
         Ok(moving)
     }
 
-    /// The effects of this procedure that explain motions which took no part in the fit.
+    /// Selects by cross-validation which effects of this procedure to identify: none, all without the compliance, or all.
     ///
     /// # Errors
     /// As [`identify_motions`].

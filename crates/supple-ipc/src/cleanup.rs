@@ -4,8 +4,9 @@
 //! process of the system is left, this module removes all of the system's objects. The membership lock keeps processes
 //! from joining meanwhile.
 //!
-//! Of each process that has ended, iceoryx2 0.9.3 leaves an empty folder, and it lists all of them whenever a process joins:
-//! with 8,500 an operator was connected after 33 ms instead of 6 ms. Whoever leaves removes those of all systems.
+//! iceoryx2 0.9.3 leaves the empty node folder of each process that has ended, and lists all of them whenever a process joins: with
+//! 8,500 of them an operator was connected after 33 ms instead of 6 ms. A process that leaves removes the empty node folders of all
+//! systems that are older than a minute.
 
 use crate::domain::{Domain, Node};
 use crate::membership;
@@ -17,8 +18,8 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-/// Age from which an empty folder of a node is removed: a process that joins has files in its own within microseconds.
-const ABANDONED: Duration = Duration::from_secs(60);
+/// Age from which an empty folder of a node is removed: a process that joins has files in its own folder within microseconds.
+const ABANDONED_AFTER: Duration = Duration::from_secs(60);
 
 /// Guard stored as the last field of every struct with ports, so that it is dropped after them.
 #[derive(Debug)]
@@ -48,10 +49,10 @@ fn clear(domain: &Domain) -> io::Result<()> {
     let listed = Node::list(domain.config(), |state| {
         match state {
             NodeState::Dead(node) => {
-                // Objects that this call misses are removed below.
+                // Objects that this call misses are removed below, once no node is left.
                 let _ = node.try_remove_stale_resources();
             }
-            // We hold the membership lock, so this process is not joining; it was killed while it joined.
+            // We hold the membership lock, so the process of this node cannot be joining: it was killed while it joined.
             NodeState::Undefined(_) => {}
             NodeState::Alive(_) | NodeState::Inaccessible(_) => has_live_node = true,
         }
@@ -76,7 +77,7 @@ fn remove_abandoned_folders(domain: &Domain) {
     for entry in entries.flatten() {
         let is_old = entry.metadata().is_ok_and(|found| {
             let age = found.modified().ok().and_then(|time| time.elapsed().ok());
-            found.is_dir() && age.is_some_and(|age| age > ABANDONED)
+            found.is_dir() && age.is_some_and(|age| age > ABANDONED_AFTER)
         });
         if is_old {
             // The folder of a running process is not empty and stays.

@@ -23,7 +23,7 @@ struct WrongCount {
 }
 
 impl LearnedSettings {
-    /// Of an arm with `N` joints.
+    /// The settings of the TOML for these terms.
     pub fn new<const N: usize>(learned: &LearnedTerms<N>) -> LearnedSettings {
         let LearnedTerms { parameters, map } = learned;
         LearnedSettings {
@@ -48,7 +48,7 @@ impl LearnedSettings {
     /// The terms; lists that are not given are zero.
     ///
     /// # Errors
-    /// A list that does not have one entry per joint, or a map without 16 coefficients, in words.
+    /// A list that does not have one entry per joint, or a map without 16 coefficients, as a message.
     pub fn terms<const N: usize>(&self) -> Result<LearnedTerms<N>, String> {
         self.checked().map_err(|wrong| {
             let WrongCount {
@@ -70,7 +70,7 @@ impl LearnedSettings {
                 expected: N,
             }),
         };
-        let knots = |key, given: &[f64]| {
+        let coefficients = |key, given: &[f64]| {
             <[f64; MAP_KNOTS]>::try_from(given).map_err(|_| WrongCount {
                 key,
                 found: given.len(),
@@ -88,8 +88,8 @@ impl LearnedSettings {
             }
             for (to, from) in map.iter_mut().zip(&self.map) {
                 *to = JointMap {
-                    torque_nm: knots("torque_nm of a map", &from.torque_nm)?,
-                    dry_nm: knots("dry_nm of a map", &from.dry_nm)?,
+                    torque_nm: coefficients("torque_nm of a map", &from.torque_nm)?,
+                    dry_nm: coefficients("dry_nm of a map", &from.dry_nm)?,
                 };
             }
         }

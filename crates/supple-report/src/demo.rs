@@ -46,9 +46,9 @@ pub fn run(args: &DemoArgs) -> Result<(), Failure> {
         print_line(&summary)?;
     } else {
         print_line(&format!("{}\n", table::table(&demo.summary)))?;
-        let adapted = table::adapted_lines(&demo.summary);
-        if !adapted.is_empty() {
-            print_line(&format!("of this arm:\n  {}\n", adapted.join("\n  ")))?;
+        let notes = table::arm_notes(&demo.summary);
+        if !notes.is_empty() {
+            print_line(&format!("Notes for this arm:\n  {}\n", notes.join("\n  ")))?;
         }
     }
     let report = args.out.join("report.html");

@@ -2,7 +2,7 @@
 
 use crate::figures::Figure;
 use crate::sections::{Section, faults, sections};
-use crate::table::adapted_lines;
+use crate::table::arm_notes;
 use crate::units::{figures, percent, plain, seconds};
 use askama::Template;
 use supple_cli::exit::Failure;
@@ -70,7 +70,7 @@ pub fn html(
         model: summary.model.as_deref(),
         logs,
         faults: fault_lines(summary),
-        adapted: adapted_lines(summary),
+        adapted: arm_notes(summary),
         parts: parts.collect(),
         stiffness_tables: [
             stiffness_table("Friction feed-forward fades in contact", &summary.probing),

@@ -21,7 +21,7 @@ pub fn table(summary: &Summary) -> String {
 
 /// One line for each run that the arm cannot perform at the size of its paths, with the reason, and for each fault that is no
 /// failure; empty for an arm whose settings are not derived.
-pub fn adapted_lines(summary: &Summary) -> Vec<String> {
+pub fn arm_notes(summary: &Summary) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(derived) = &summary.derived {
         let worst = summary.perturbed_rms_m.iter().copied().fold(0.0, f64::max);

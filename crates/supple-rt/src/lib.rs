@@ -67,7 +67,7 @@ pub fn main() -> ExitCode {
         .iter()
         .filter(|_| !options.supervised())
     {
-        eprintln!("supple-rt: warning: {warning}");
+        diagnostics::post(format_args!("supple-rt: warning: {warning}"));
     }
     let result = with_dof!(description.dof(), N => run::<N>(&description, &options, &stop));
     match result.map_err(RtError::from).flatten() {

@@ -1,7 +1,7 @@
-//! The simulated arm as a process: same messages and clock as a real one, no bus.
+//! The simulated arm as a process: same messages as a real one, no bus.
 //!
-//! It owns the clock, and runs the plant loop and the guard of every arm ([`supple_drive`]): a lost controller ends as
-//! on a real arm. In real time each cycle starts at its scheduled time, whatever the controller does; when the host
+//! It owns the clock, and runs the plant loop and the guard of every arm ([`supple_drive`]), so that the loss of the controller has
+//! the same consequences as on a real arm. In real time each cycle starts at its scheduled time, whatever the controller does; when the host
 //! stalls, simulated time pauses. In virtual time each cycle waits for its answer, so results are reproducible bit for
 //! bit and the run is as fast as both processes allow.
 //!
@@ -46,7 +46,7 @@ pub fn main() -> ExitCode {
         .iter()
         .filter(|_| !options.supervised())
     {
-        eprintln!("supple-sim: warning: {warning}");
+        diagnostics::post(format_args!("supple-sim: warning: {warning}"));
     }
     let result = with_dof!(description.dof(), N => run::<N>(&description, &options, &stop));
     match result.map_err(SimError::from).flatten() {
@@ -68,7 +68,7 @@ fn report_error(error: &SimError) -> ExitCode {
 /// Runs until shutdown is requested, or for the number of cycles in the options.
 ///
 /// # Errors
-/// [`SimError`]: an invalid arm, shared memory that cannot be used.
+/// [`SimError`]: an invalid arm, plant options or fault, a trace file that cannot be written, shared memory that cannot be used.
 pub fn run<const N: usize>(
     description: &Description,
     options: &Options,

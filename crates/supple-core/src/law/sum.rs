@@ -65,7 +65,7 @@ fn by_mass_matrix<T: Target<D>, const D: usize, const N: usize, const G: usize>(
 ) -> Option<Vector<N>> {
     let mut terms = Terms::default();
     fill(sweep, arm, now.velocity_rad_per_s, &mut terms);
-    let task = Task::of_state(&terms, roles)?;
+    let task = Task::from_terms(&terms, roles)?;
     let bias = terms.jacobian_dot_qd.fixed_rows::<D>(0).into_owned();
     let sum = Sum::new(roles, &task, sweep, bias, now);
     let inertial = terms.mass_matrix * (task.inverse * sum.acceleration);

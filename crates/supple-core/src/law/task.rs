@@ -26,7 +26,7 @@ use crate::math::{Matrix, Matrix3};
 
 /// Smallest singular value of the active Jacobian below which the position's inverse is damped \[m\].
 pub const SINGULAR_BELOW_M: f64 = 0.18;
-/// Greatest mass that the damped inverse commands along a lost direction \[kg\].
+/// Mass that the damped inverse commands along a lost direction at a singular pose \[kg\]; near the pose up to twice as much.
 pub const MAX_TASK_MASS_KG: f64 = 20.0;
 /// Greatest moment of inertia that the damped inverse commands about a lost direction \[kg m^2\].
 pub const MAX_TASK_INERTIA_KG_M2: f64 = 2.0;
@@ -45,15 +45,15 @@ pub fn singularity_damping_per_kg(sigma_m: f64) -> f64 {
 /// Pivot `i` of the pose's mobility, damped.
 #[inline]
 fn damped_pivot(i: usize, pivot: f64) -> f64 {
-    let max_inertia = if i < 3 {
+    let max_mass_or_inertia = if i < 3 {
         MAX_TASK_MASS_KG
     } else {
         MAX_TASK_INERTIA_KG_M2
     };
-    let x = pivot * max_inertia;
+    let x = pivot * max_mass_or_inertia;
     if x < 1.0 {
         let f = 1.0 - x * x;
-        pivot + f * f / max_inertia
+        pivot + f * f / max_mass_or_inertia
     } else {
         pivot
     }
@@ -90,7 +90,7 @@ impl<const N: usize> Task<N, 3> {
         let jacobian = active_jacobian(terms, roles, active);
         let sigma = min_singular_value(&jacobian);
         let damping = singularity_damping_per_kg(sigma);
-        Task::damped(jacobian, terms, roles, active, sigma, damping)
+        Task::from_jacobian(jacobian, terms, roles, active, sigma, damping)
     }
 }
 
@@ -98,15 +98,15 @@ impl<const N: usize> Task<N, 6> {
     /// The task of the tip's pose. `None` where the mass matrix of the active joints is not positive
     /// definite, or where fewer than six joints are active.
     pub fn of_pose(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N, 6>> {
-        Task::of_state(terms, roles)
+        Task::from_terms(terms, roles)
     }
 }
 
 impl<const N: usize, const D: usize> Task<N, D> {
-    /// The task of a state, for the sum: a caller that does not read the smallest singular value does not
-    /// wait for it, which takes as long as the rest of the law, where it is surely great enough.
+    /// As [`Task::new`] and [`Task::of_pose`], for `law::sum`. Far from a singular pose a cheap bound shows that the position needs no
+    /// damping, so that no other result depends on the smallest singular value, whose computation takes as long as the rest.
     #[inline(always)]
-    pub(crate) fn of_state(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N, D>> {
+    pub(crate) fn from_terms(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N, D>> {
         let active = count_active(roles);
         let position = active_jacobian::<N, 3>(terms, roles, active);
         let sigma = min_singular_value(&position);
@@ -116,11 +116,11 @@ impl<const N: usize, const D: usize> Task<N, D> {
             0.0
         };
         let jacobian = active_jacobian(terms, roles, active);
-        Task::damped(jacobian, terms, roles, active, sigma, damping)
+        Task::from_jacobian(jacobian, terms, roles, active, sigma, damping)
     }
 
     #[inline(always)]
-    fn damped(
+    fn from_jacobian(
         jacobian: Matrix<D, N>,
         terms: &Terms<N>,
         roles: &[Role; N],
@@ -140,24 +140,24 @@ impl<const N: usize, const D: usize> Task<N, D> {
             &decoupled
         };
         let mut is_damped = damping != 0.0;
-        let three = if N == 3 && active == 3 {
+        let three_joints = if N == 3 && active == 3 {
             Some([0, 1, 2])
         } else if active == 3 {
             three_active(roles)
         } else {
             None
         };
-        let inverse = match three {
+        let inverse = match three_joints {
             Some(joints) if D == 3 && damping == 0.0 => {
-                // What the inverse does not ask for, but the arm has to be.
+                // The inverse does not use the mass matrix, but one that is not positive definite is rejected all the same.
                 if !is_positive_definite_3(mass_matrix, joints) {
                     return None;
                 }
                 inverse_of_three(&jacobian, joints)
             }
             _ => {
-                let mobile = Cholesky::new(mass_matrix)?.solve(&jacobian.transpose());
-                let mobility = lower_product(&jacobian, &mobile, damping);
+                let inverse_mass_jt = Cholesky::new(mass_matrix)?.solve(&jacobian.transpose());
+                let mobility = lower_product(&jacobian, &inverse_mass_jt, damping);
                 let factor = if D == 3 {
                     Cholesky::new(&mobility)?
                 } else {
@@ -167,7 +167,7 @@ impl<const N: usize, const D: usize> Task<N, D> {
                         damped
                     })?
                 };
-                factor.solve(&mobile.transpose()).transpose()
+                factor.solve(&inverse_mass_jt.transpose()).transpose()
             }
         };
         Some(Task {
@@ -179,7 +179,7 @@ impl<const N: usize, const D: usize> Task<N, D> {
     }
 }
 
-/// The tip's position on three active joints, independent of the mass matrix; `None` near singular
+/// The position task of an arm with three joints, all active, independent of the mass matrix; `None` near singular
 /// poses. `columns` are those of the Jacobian.
 #[inline(always)]
 pub(crate) fn square_task<const N: usize, const D: usize>(
@@ -196,11 +196,11 @@ pub(crate) fn square_task<const N: usize, const D: usize>(
     })
 }
 
-/// `J X + damping`, from the diagonal downwards.
+/// `J H^-1 J^T + damping`, the lower triangle alone; the rest stays zero.
 #[inline(always)]
 fn lower_product<const N: usize, const D: usize>(
     jacobian: &Matrix<D, N>,
-    mobile: &Matrix<N, D>,
+    inverse_mass_jt: &Matrix<N, D>,
     damping: f64,
 ) -> Matrix<D, D> {
     let mut product = Matrix::zeros();
@@ -208,7 +208,7 @@ fn lower_product<const N: usize, const D: usize>(
         for i in j..D {
             let mut sum = NEGATIVE_ZERO;
             for k in 0..N {
-                sum += jacobian.data.0[k][i] * mobile.data.0[j][k];
+                sum += jacobian.data.0[k][i] * inverse_mass_jt.data.0[j][k];
             }
             product.data.0[j][i] = sum + if i == j { damping } else { 0.0 };
         }

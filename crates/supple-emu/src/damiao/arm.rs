@@ -206,7 +206,7 @@ impl<const N: usize> DamiaoArm<N> {
     }
 
     /// Current time by the machine's monotonic clock \[ns\].
-    pub fn wall_ns(&self) -> u64 {
+    pub fn monotonic_ns(&self) -> u64 {
         self.now_ns + self.offset_ns
     }
 
@@ -218,7 +218,7 @@ impl<const N: usize> DamiaoArm<N> {
 
     /// Pauses the arm for `gap_ns`, without motion; frames that wait for the bus are lost.
     pub fn shift_clock(&mut self, gap_ns: u64) {
-        self.wire.clear();
+        self.wire.pause(gap_ns);
         self.next_tick_ns += gap_ns;
         self.now_ns += gap_ns;
     }
@@ -233,7 +233,7 @@ impl<const N: usize> DamiaoArm<N> {
             (MisbehaviourKind::BusOff, _) => {
                 self.bus_off_until_ns = Some(self.now_ns + self.config.restart_ns);
                 self.pending_fault = Some(BusFault::BusOff);
-                self.wire.clear();
+                self.wire.discard(|_| true);
             }
             (MisbehaviourKind::Wedged, _) => self.wedged = true,
             (MisbehaviourKind::SwappedWith { other, same }, Some(motor)) => {

@@ -158,7 +158,7 @@ impl<const N: usize> Process<N> {
         self.write_trace();
         let events = self.arm.events();
         // By the machine's clock, as the trace.
-        let offset_ns = self.arm.wall_ns() - self.arm.now_ns();
+        let offset_ns = self.arm.monotonic_ns() - self.arm.now_ns();
         for (number, (time_ns, event)) in events.iter().enumerate().skip(self.reported) {
             let time_s = (*time_ns + offset_ns) as f64 * 1e-9;
             match event {
@@ -197,7 +197,7 @@ impl<const N: usize> Process<N> {
         let active = self.enabled();
         if let Some(trace) = &mut self.trace {
             let sample = Sample {
-                time_ns: self.arm.wall_ns(),
+                time_ns: self.arm.monotonic_ns(),
                 active,
                 torque_nm: self.arm.motor_torque_nm().into(),
                 mode: None,

@@ -1,4 +1,4 @@
-//! The registers of one motor: a working copy and the one in flash.
+//! One bank of the registers of a motor; `motor.rs` keeps one in RAM and one in flash.
 
 use super::config::MotorConfig;
 use supple_damiao::register::REGISTERS;
@@ -14,7 +14,8 @@ const BIT_RATES: [u32; 2] = [4, 9];
 pub(super) struct Registers([[u8; 4]; COUNT]);
 
 impl Registers {
-    /// Registers of a motor that was set up: the maker's parameter file of a 4310, but for what the type decides.
+    /// Registers of a motor that has been set up: those of the maker's parameter file for a DM4310; ids, timeout, ranges, gear ratio,
+    /// pole pairs, flux and bit rates are those of `config`.
     pub fn new(config: &MotorConfig) -> Registers {
         let mut registers = Registers([[0; 4]; COUNT]);
         let float = |value: f64| Value::Float(value as f32);

@@ -76,7 +76,7 @@ pub enum PointsError {
 
 /// A motion of the tip over time.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Shown {
+pub struct RecordedMotion {
     /// Times, increasing \[s\].
     pub time_s: Vec<f64>,
     /// Tip in base axes \[m\].
@@ -89,12 +89,12 @@ pub struct Shown {
 #[derive(Clone, Debug, PartialEq)]
 pub enum Points {
     /// A motion with its times.
-    Shown(Shown),
+    RecordedMotion(RecordedMotion),
     /// Points of the tip \[m\].
     Waypoints(Vec<Vector3<f64>>),
 }
 
-impl Shown {
+impl RecordedMotion {
     /// Adds a sample.
     pub fn push(&mut self, time_s: f64, tip_m: Vector3<f64>, joints_rad: &[f64]) {
         self.time_s.push(time_s);
@@ -112,7 +112,7 @@ impl Shown {
 
     /// The same motion without the time before and after it in which the tip rests, from time zero; `None` if it never
     /// moves.
-    pub fn trimmed(&self) -> Option<Shown> {
+    pub fn trimmed(&self) -> Option<RecordedMotion> {
         let moves = |i: usize| {
             let until = self.time_s[i] + SPEED_S;
             let j = self.time_s.partition_point(|time_s| *time_s < until);
@@ -129,7 +129,7 @@ impl Shown {
         let begin = self.time_s.partition_point(|time_s| *time_s < from_s);
         let end = self.time_s.partition_point(|time_s| *time_s <= to_s);
         let start_s = self.time_s[begin];
-        Some(Shown {
+        Some(RecordedMotion {
             time_s: self.time_s[begin..end]
                 .iter()
                 .map(|t| t - start_s)
@@ -212,7 +212,7 @@ fn parse(text: &str, file: &str) -> Result<Points, PointsError> {
     }
     let time = find("time_s");
     let joints: Vec<usize> = (1..).map_while(|i| find(&format!("q{i}_rad"))).collect();
-    let mut shown = Shown::default();
+    let mut shown = RecordedMotion::default();
     for (index, line) in lines {
         let values: Vec<&str> = line.split(',').map(str::trim).collect();
         let number = |column: usize| {
@@ -251,7 +251,7 @@ fn parse(text: &str, file: &str) -> Result<Points, PointsError> {
         });
     }
     Ok(match time {
-        Some(_) => Points::Shown(shown),
+        Some(_) => Points::RecordedMotion(shown),
         None => Points::Waypoints(shown.tip_m),
     })
 }
@@ -260,8 +260,8 @@ fn parse(text: &str, file: &str) -> Result<Points, PointsError> {
 mod tests {
     use super::*;
 
-    fn shown() -> Shown {
-        let mut shown = Shown::default();
+    fn shown() -> RecordedMotion {
+        let mut shown = RecordedMotion::default();
         // A second of rest, two seconds of motion, two of rest.
         for k in 0..500 {
             let time_s = 0.01 * f64::from(k);
@@ -277,7 +277,7 @@ mod tests {
         let file = folder.path().join("shown.csv");
         let shown = shown();
         shown.write(&file).expect("written");
-        let Ok(Points::Shown(read)) = read_points(&file) else {
+        let Ok(Points::RecordedMotion(read)) = read_points(&file) else {
             panic!("not a motion");
         };
         assert_eq!(read.time_s.len(), 500);
@@ -299,7 +299,7 @@ mod tests {
         );
         assert_eq!(trimmed.tip_m[0].y, 0.0);
         assert!((trimmed.tip_at(99.0).y - 0.2).abs() < 1e-12);
-        let mut still = Shown::default();
+        let mut still = RecordedMotion::default();
         for k in 0..100 {
             still.push(0.01 * f64::from(k), Vector3::repeat(0.1), &[]);
         }

@@ -1,13 +1,13 @@
 //! A motion as set-points that the controller accepts.
 
-use super::Shown;
+use super::RecordedMotion;
 use super::smoothing::reference_at;
 use crate::start::start_pose;
 use supple_core::controller::{Refusal, Request, SetPoint, check_references};
 use supple_core::trajectory::Segment;
 use supple_core::{Controller, Reference, Trajectory, Vector};
 
-/// Time between two set-points at the speed that was shown \[s\].
+/// Time between two set-points at the speed of the motion \[s\].
 const SPACING_S: f64 = 0.04;
 /// Half of the time over which the motion is smoothed \[s\].
 const HALF_S: f64 = 0.06;
@@ -30,6 +30,18 @@ pub enum RepetitionError {
     /// The arm cannot reach its start.
     #[error("the start: {0}")]
     Start(String),
+    /// The speed asks for set-points too far apart.
+    #[error(
+        "at {speed} times the speed the set-points are {spacing_s:.2} s apart, more than {MAX_SPACING_S} s: choose a speed of at \
+         least {}",
+        SPACING_S / MAX_SPACING_S
+    )]
+    TooSlow {
+        /// Requested speed, as a multiple of that of the motion.
+        speed: f64,
+        /// Time between two set-points \[s\].
+        spacing_s: f64,
+    },
     /// The tip never moves.
     #[error("the tip rests during the whole motion: there is nothing to repeat")]
     NoMotion,
@@ -44,26 +56,26 @@ pub struct Repetition<const N: usize> {
     pub points: Vec<Reference>,
     /// Cycles from one set-point to the next.
     pub spacing_cycles: u64,
-    /// Duration over that of the motion as it was shown.
+    /// Duration over that of the motion as recorded.
     pub slowdown: f64,
 }
 
 impl<const N: usize> Repetition<N> {
-    /// Plans a motion at `speed` times the shown one, or slower where a limit needs it. The pose at the start is the shown
+    /// Plans a motion at `speed` times its own, or slower where a limit needs it. The pose at the start is the recorded
     /// one, or else any that reaches it.
     ///
     /// # Errors
     /// [`RepetitionError`]: a motion out of reach, or one that is too fast or needs too much torque at every speed.
     pub fn plan(
         controller: &Controller<N>,
-        shown: &Shown,
+        shown: &RecordedMotion,
         speed: f64,
     ) -> Result<Repetition<N>, RepetitionError> {
         let config = controller.config();
         let (Some(begin_s), Some(tip_m)) = (shown.time_s.first(), shown.tip_m.first()) else {
             return Err(RepetitionError::NoMotion);
         };
-        // The motion as the smoothing sees it begins before its first sample, and ends after its last one.
+        // The smoothing window extends beyond both ends of the motion.
         let length_s = shown.duration_s() + 2.0 * HALF_S;
         let intervals = (length_s / SPACING_S).ceil() as usize;
         let at = |k: usize| reference_at(shown, begin_s - HALF_S + SPACING_S * k as f64, HALF_S);
@@ -76,9 +88,13 @@ impl<const N: usize> Repetition<N> {
             _ => start_pose(config, "motion", &Trajectory::Hold(*tip_m), 0.0)
                 .map_err(|error| RepetitionError::Start(error.to_string()))?,
         };
-        // Rounded up, but for what the division adds.
+        // Rounded up, with a tolerance for the rounding of the division.
         let cycles = |spacing_s: f64| (spacing_s / config.period_s - 1e-9).ceil().max(1.0) as u64;
         let mut spacing_cycles = cycles(SPACING_S / speed);
+        let spacing_s = spacing_cycles as f64 * config.period_s;
+        if spacing_s > MAX_SPACING_S {
+            return Err(RepetitionError::TooSlow { speed, spacing_s });
+        }
         loop {
             let slowdown = spacing_cycles as f64 * config.period_s / SPACING_S;
             let repetition = Repetition {
@@ -91,13 +107,13 @@ impl<const N: usize> Repetition<N> {
                 return Ok(repetition);
             };
             let next = cycles(SLOWER * spacing_cycles as f64 * config.period_s);
-            let may_help = !matches!(
+            let slowing_may_help = !matches!(
                 refusal,
                 Refusal::OutOfReach { .. } | Refusal::Workspace { .. }
             );
-            if !may_help || next as f64 * config.period_s > MAX_SPACING_S {
+            if !slowing_may_help || next as f64 * config.period_s > MAX_SPACING_S {
                 return Err(RepetitionError::Refused {
-                    time_s: time_s / slowdown - HALF_S,
+                    time_s: (time_s / slowdown - HALF_S).max(0.0),
                     refusal,
                 });
             }
@@ -178,8 +194,8 @@ impl<const N: usize> Repetition<N> {
         start_cycle + self.spacing_cycles * self.len() as u64
     }
 
-    /// The time of the shown motion that is repeated in this cycle, from its first sample \[s\].
-    pub fn shown_s(&self, start_cycle: u64, cycle: u64) -> f64 {
+    /// The time in the recorded motion that is repeated in this cycle, from its first sample \[s\].
+    pub fn recorded_time_s(&self, start_cycle: u64, cycle: u64) -> f64 {
         let cycles = cycle.saturating_sub(start_cycle) as f64;
         SPACING_S * cycles / self.spacing_cycles as f64 - HALF_S
     }

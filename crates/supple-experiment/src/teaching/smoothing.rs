@@ -1,13 +1,13 @@
 //! Position, velocity and acceleration of a sampled motion: a parabola through the samples around each time.
 
-use super::Shown;
+use super::RecordedMotion;
 use nalgebra::{Matrix3, Matrix3x1};
 use supple_core::Reference;
 use supple_core::math::Vector3;
 
 /// The motion at a time \[s\], from the samples within `half_s` before and after; it rests before its first and after its
 /// last sample.
-pub fn reference_at(shown: &Shown, time_s: f64, half_s: f64) -> Reference {
+pub fn reference_at(shown: &RecordedMotion, time_s: f64, half_s: f64) -> Reference {
     let (Some(first_s), Some(last_s)) = (shown.time_s.first(), shown.time_s.last()) else {
         return Reference::at_rest(Vector3::zeros());
     };
@@ -44,7 +44,7 @@ mod tests {
 
     #[test]
     fn a_parabola_is_met_exactly_and_the_ends_rest() {
-        let mut shown = Shown::default();
+        let mut shown = RecordedMotion::default();
         for k in 0..=400 {
             let t = 0.005 * f64::from(k);
             shown.push(t, Vector3::new(0.1 * t * t, 0.2 * t, 0.3), &[]);

@@ -5,7 +5,7 @@
 //! the largest `x` from which the arm can still slow down, one forwards the largest that it can reach (the two passes of
 //! reachability analysis, Pham and Pham 2018, in closed form for these limits). A mean over [`SMOOTHING_S`] bounds the jerk.
 
-use super::Shown;
+use super::RecordedMotion;
 use nalgebra::DMatrix;
 use supple_core::math::Vector3;
 
@@ -52,7 +52,7 @@ pub fn time_waypoints(
     points_m: &[Vector3<f64>],
     speed_m_per_s: f64,
     acceleration_m_per_s2: f64,
-) -> Result<Shown, WaypointError> {
+) -> Result<RecordedMotion, WaypointError> {
     if points_m.len() > MAX_POINTS {
         return Err(WaypointError::TooMany {
             found: points_m.len(),
@@ -198,7 +198,7 @@ fn times(path: &Path, speed_m_per_s: f64, acceleration_m_per_s2: f64) -> Vec<f64
 }
 
 /// Samples of the motion at equal times, with the way along the path averaged over [`SMOOTHING_S`].
-fn sampled(path: &Path, times_s: &[f64]) -> Shown {
+fn sampled(path: &Path, times_s: &[f64]) -> RecordedMotion {
     let length_m = path.step_m * (path.points_m.len() - 1) as f64;
     let way_m = |time_s: f64| {
         let after = times_s.partition_point(|t| *t <= time_s);
@@ -214,7 +214,7 @@ fn sampled(path: &Path, times_s: &[f64]) -> Shown {
     let duration_s = times_s[times_s.len() - 1] + SMOOTHING_S;
     let samples = (duration_s / SAMPLE_S).ceil() as usize;
     let parts = (SMOOTHING_S / SAMPLE_S).round() as usize * 4;
-    let mut shown = Shown::default();
+    let mut shown = RecordedMotion::default();
     for k in 0..=samples {
         let time_s = SAMPLE_S * k as f64;
         let mean_m = (0..parts)
@@ -236,7 +236,7 @@ mod tests {
     use super::*;
 
     /// Peak speed and acceleration, from differences over 40 ms.
-    fn peaks(shown: &Shown) -> (f64, f64) {
+    fn peaks(shown: &RecordedMotion) -> (f64, f64) {
         let (mut speed, mut acceleration) = (0.0_f64, 0.0_f64);
         let d = 8;
         for i in d..shown.time_s.len() - d {

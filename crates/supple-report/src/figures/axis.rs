@@ -32,38 +32,42 @@ impl<'a> Axis<'a> {
             scale: Scale {
                 ticks,
                 range,
-                decades: false,
+                logarithmic: false,
             },
         }
     }
 
-    /// Logarithmic axis over a range above zero; ticks at 1, 2 and 5.
+    /// Logarithmic axis over a range above zero; ticks at 1, 2 and 5 of each decade.
     pub fn logarithmic(label: &'a str, range: Range<f64>) -> Axis<'a> {
         let first = range.start.log10().floor() as i32;
         let last = range.end.log10().ceil() as i32;
-        let decades = (first..=last)
+        let ticks_at = (first..=last)
             .flat_map(|d| [1.0, 2.0, 5.0].map(|mantissa| mantissa * 10.0_f64.powi(d)));
         let ticks = Ticks {
-            at: decades.collect(),
+            at: ticks_at.collect(),
             decimals: 0,
         };
         let mut axis = Axis::bounded(label, ticks, range);
-        axis.scale.decades = true;
+        axis.scale.logarithmic = true;
         axis
     }
 }
 
-/// Numbers along an axis.
+/// Mapping from values to positions along an axis, linear or logarithmic, with its ticks.
 #[derive(Clone, Debug)]
 pub struct Scale {
     ticks: Ticks,
     range: Range<f64>,
-    decades: bool,
+    logarithmic: bool,
 }
 
 impl Scale {
-    fn along(&self, value: f64) -> f64 {
-        if self.decades { value.log10() } else { value }
+    fn coordinate(&self, value: f64) -> f64 {
+        if self.logarithmic {
+            value.log10()
+        } else {
+            value
+        }
     }
 }
 
@@ -72,12 +76,16 @@ impl Ranged for Scale {
     type ValueType = f64;
 
     fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
-        let (from, to) = (self.along(self.range.start), self.along(self.range.end));
-        let share = (self.along(*value) - from) / (to - from);
+        let (from, to) = (
+            self.coordinate(self.range.start),
+            self.coordinate(self.range.end),
+        );
+        let share = (self.coordinate(*value) - from) / (to - from);
         limit.0 + (share * f64::from(limit.1 - limit.0)).round() as i32
     }
 
     fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        // No minor grid lines.
         if hint.weight().allow_light_points() {
             return Vec::new();
         }
@@ -95,9 +103,9 @@ impl ValueFormatter<f64> for Scale {
     }
 
     fn format_ext(&self, value: &f64) -> String {
-        if self.decades {
-            let below_one = (-value.log10().floor()).max(0.0);
-            return number(*value, below_one as usize);
+        if self.logarithmic {
+            let decimals = (-value.log10().floor()).max(0.0);
+            return number(*value, decimals as usize);
         }
         self.ticks.label(*value)
     }

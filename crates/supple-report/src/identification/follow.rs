@@ -32,7 +32,7 @@ struct Summary<'a> {
     seed: u64,
     /// Effects of a real arm in the plant; empty without any.
     plant: &'a PlantOptions,
-    /// Durations of the designed motion and of the slow motion after it \[s\].
+    /// Durations of the designed motion and, unless left out, of the slow motion after it \[s\].
     recorded_s: Vec<f64>,
 }
 
@@ -80,11 +80,18 @@ fn run_with_dof<const N: usize>(
     let plant = plant_of::<N>(arm, &calibration)?;
     let effects = &calibration.plant;
     let (config, home) = (arm.config::<N>()?, arm.home::<N>()?);
-    let mut series = vec![design.series.fourier::<N>()?];
-    if !args.no_slow {
-        series.push(slow_motion(&config, &home, &design.moving)?);
+    if let Some(joint) = design.moving.iter().find(|joint| **joint >= N) {
+        return Err(Failure::from(ReadError::Table {
+            file: args.design.display().to_string(),
+            problem: format!("joint {joint} of `moving` is not one of the {N} joints of this arm"),
+            remedy: "give the arm of the design with --arm",
+        }));
     }
-    let session = excitation("excitation", &config, &plant, &home, &series);
+    let mut trajectories = vec![design.series.fourier::<N>()?];
+    if !args.no_slow {
+        trajectories.push(slow_motion(&config, &home, &design.moving)?);
+    }
+    let session = excitation("excitation", &config, &plant, &home, &trajectories);
     session.record_with_notes(
         Some(&staging.folder("logs")?),
         arm,
@@ -97,7 +104,10 @@ fn run_with_dof<const N: usize>(
         log: args.out.join("logs/excitation.mcap"),
         seed: args.seed,
         plant: effects,
-        recorded_s: series.iter().map(|series| series.duration_s).collect(),
+        recorded_s: trajectories
+            .iter()
+            .map(|series| series.duration_s)
+            .collect(),
     };
     let text = supple_cli::console::json(&summary)?;
     staging.write("summary.json", format!("{text}\n").as_bytes())?;

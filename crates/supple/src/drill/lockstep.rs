@@ -31,9 +31,8 @@ const RAMPED_BLOCK_CLEARANCE_M: f64 = 0.004;
 const CAP_M: f64 = 0.02;
 /// Observation time after the event \[s\].
 const OBSERVED_S: f64 = 1.5;
-/// Time from disabling the drives until the operator activates them again; second value: with an emergency stop in
-/// between \[s\].
-const REENABLE_S: (f64, f64) = (1.0, 3.0);
+/// Time from disabling the drives until the operator activates them again \[s\].
+const REENABLE_S: f64 = 1.0;
 /// Time in which an arm with idle drives sinks from its home pose onto its stops \[s\].
 const SUNK_S: f64 = 4.5;
 /// Timeout of a run in wall-clock time; the longest run takes seconds.
@@ -136,9 +135,9 @@ impl<const N: usize> Run<N> {
         let times = Times {
             event_s: start_s + script.event_cycle as f64 * config.period_s,
             back_s: match spec.event {
-                Event::Drives(DriveShutdown::EStop) => REENABLE_S.1,
+                Event::Drives(DriveShutdown::EStop) => 0.0,
                 Event::Drives(DriveShutdown::IdleAtHome) => SUNK_S,
-                Event::Drives(_) | Event::Activation(Activation::InFault) => REENABLE_S.0,
+                Event::Drives(_) | Event::Activation(Activation::InFault) => REENABLE_S,
                 _ => 0.0,
             },
         };
@@ -226,7 +225,7 @@ impl Times {
             for_s: Some(self.event_s + self.back_s + OBSERVED_S),
             virtual_time: true,
             no_realtime: true,
-            ..UpArgs::bare(spec.plant, arm.name.clone())
+            ..UpArgs::with_defaults(spec.plant, arm.name.clone())
         }
     }
 }
@@ -287,12 +286,8 @@ fn presses(spec: &Spec, times: &Times) -> Vec<String> {
         ) => {
             vec![at("idle", 0.0), at("activate", back_s)]
         }
-        Event::Drives(DriveShutdown::EStop) => vec![
-            at("e-stop", 0.0),
-            at("release", 0.5),
-            at("idle", 0.6),
-            at("activate", back_s),
-        ],
+        // The arm loses its positions with its power: there is no way back without a new start.
+        Event::Drives(DriveShutdown::EStop) => vec![at("e-stop", 0.0)],
         Event::Activation(_) => vec![at("activate", back_s)],
         _ => Vec::new(),
     }

@@ -72,7 +72,7 @@ pub fn perform<const N: usize>(
         rate_hz: arm.rate_hz,
         prefix: Some(prefix),
         no_realtime: args.no_realtime,
-        ..UpArgs::bare(spec.plant, arm.name.clone())
+        ..UpArgs::with_defaults(spec.plant, arm.name.clone())
     };
     let lose = || match spec.event {
         Event::Process { name: UP, .. } => lose_up_process::<N>(spec, &up, description, &domain),

@@ -244,7 +244,7 @@ impl fmt::Display for Event {
             Event::Drives(DriveShutdown::IdleWhenStiff) => {
                 f.write_str("stiff-drives-idle-and-back")
             }
-            Event::Drives(DriveShutdown::EStop) => f.write_str("e-stop-and-back"),
+            Event::Drives(DriveShutdown::EStop) => f.write_str("e-stop"),
             Event::Drives(DriveShutdown::IdleAtHome) => f.write_str("drives-idle-at-home-and-back"),
             Event::Activation(Activation::InFault) => f.write_str("activated-in-a-fault"),
             Event::Activation(Activation::InWork) => f.write_str("activated-in-work"),

@@ -20,7 +20,9 @@ use supple_core::controller::{Mode, Request};
 use supple_core::math::Vector3;
 use supple_experiment::ExperimentError;
 use supple_experiment::metrics::Rms;
-use supple_experiment::teaching::{Points, Repetition, Shown, read_points, time_waypoints};
+use supple_experiment::teaching::{
+    Points, RecordedMotion, Repetition, read_points, time_waypoints,
+};
 use supple_ipc::message::Telemetry;
 use supple_ipc::{Domain, TelemetryReader};
 use supple_model::{Description, with_dof};
@@ -103,7 +105,7 @@ fn teach_sized<const N: usize>(
         prefix: domain.prefix(),
         last: Instant::now(),
     };
-    let mut shown = Shown::default();
+    let mut shown = RecordedMotion::default();
     let (mut start_ns, mut next_ns) = (None, 0);
     let until_s = args.for_s.unwrap_or(MAX_TEACH_S);
     let ended = loop {
@@ -251,7 +253,7 @@ fn perform_sized<const N: usize>(
         reason,
     };
     let (shown, speed) = match points {
-        Points::Shown(shown) => (shown.clone(), performance.speed),
+        Points::RecordedMotion(shown) => (shown.clone(), performance.speed),
         Points::Waypoints(points_m) => {
             let share = LIMIT_SHARE * performance.speed.min(1.0);
             let limits = &config.limits;
@@ -329,7 +331,8 @@ fn perform_sized<const N: usize>(
             });
         }
         if (start_cycle..=end_cycle).contains(&cycle) {
-            let shown_m = shown.tip_at(shown.time_s[0] + repetition.shown_s(start_cycle, cycle));
+            let shown_m =
+                shown.tip_at(shown.time_s[0] + repetition.recorded_time_s(start_cycle, cycle));
             error.add((Vector3::from(record.tip_position_m) - shown_m).norm());
             cycles += 1;
         }

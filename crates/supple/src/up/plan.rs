@@ -62,8 +62,9 @@ impl Plan {
     /// Plans the processes; in virtual time the clock owner exits after `cycles`.
     ///
     /// # Errors
-    /// [`Failure::Injection`] if this plant does not support an injected fault; [`Failure::System`] if the folder of an
-    /// emulated bus does not belong to this user; [`Failure::VirtualTimeOnRealBus`].
+    /// Options that this plant does not support: [`Failure::Injection`], [`Failure::InjectionIntoRealArm`],
+    /// [`Failure::MisbehaviourWithoutMotors`], [`Failure::OptionsOfRealArm`], [`Failure::HandNeedsMode`],
+    /// [`Failure::VirtualTimeOnRealBus`]; [`Failure::System`] if the folder of an emulated bus does not belong to this user.
     pub fn new(
         args: &UpArgs,
         description: &Description,
@@ -71,8 +72,8 @@ impl Plan {
         cycles: Option<u64>,
     ) -> Result<Plan, Failure> {
         args.check_injections()?;
-        let has_emulated_motors = args.plant == PlantKind::Emu && description.bus().is_some();
-        if !args.misbehave.is_empty() && !has_emulated_motors {
+        let emulates_damiao = args.plant == PlantKind::Emu && description.bus().is_some();
+        if !args.misbehave.is_empty() && !emulates_damiao {
             return Err(Failure::MisbehaviourWithoutMotors);
         }
         args.check_plant_options()?;
@@ -112,13 +113,13 @@ impl Plan {
         };
         if let Some(bus) = bus {
             let emulated = args.plant == PlantKind::Emu;
-            let of_bus = &mut plan.clock_owner.arguments;
-            of_bus.extend(["--bus".to_owned(), bus.to_string()]);
+            let clock_owner_arguments = &mut plan.clock_owner.arguments;
+            clock_owner_arguments.extend(["--bus".to_owned(), bus.to_string()]);
             for (flag, given) in [
                 ("--zero-at-home", emulated || args.zero_at_home),
                 ("--tare", args.tare),
             ] {
-                of_bus.extend(given.then(|| flag.to_owned()));
+                clock_owner_arguments.extend(given.then(|| flag.to_owned()));
             }
             if emulated {
                 let mut arguments = args.common_arguments(domain);
@@ -156,8 +157,8 @@ impl PlantKind {
 }
 
 impl UpArgs {
-    /// A system without log and page that prints JSON, everything else as without options on the command line.
-    pub fn bare(plant: PlantKind, arm: String) -> UpArgs {
+    /// The defaults of the command line, but without log and page, and with JSON.
+    pub fn with_defaults(plant: PlantKind, arm: String) -> UpArgs {
         UpArgs {
             urdf: UrdfArgs::default(),
             plant,
@@ -202,7 +203,8 @@ impl UpArgs {
         }
     }
 
-    /// Command-line arguments that start the same system.
+    /// Command-line arguments that start the same system in real time, as far as test cases use them: neither bus, home pose, tare,
+    /// duration nor page.
     pub fn to_arguments(&self) -> Vec<String> {
         let mut arguments = vec!["up", "--json", "--arm", &self.arm, "--plant"];
         arguments.push(match self.plant {
@@ -238,7 +240,7 @@ impl UpArgs {
         arguments
     }
 
-    /// Arguments of a simulated plant: block, injected faults and trace file.
+    /// Arguments of a simulated plant: block, injected faults, plant options and trace file.
     fn simulation_arguments(&self) -> Vec<String> {
         let mut arguments = Vec::new();
         if let Some(face_m) = self.block_m {
@@ -274,7 +276,7 @@ impl UpArgs {
             plant => {
                 let hand = self.plant_options.options()?.hand;
                 match hand {
-                    // An arm on a bus does not receive the mode.
+                    // An emulated arm does not know the mode, so that a hand cannot grip it in float alone.
                     Some(hand) if plant == PlantKind::Emu && hand.when == Grip::Float => {
                         Err(Failure::HandNeedsMode)
                     }

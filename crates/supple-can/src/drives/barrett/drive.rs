@@ -354,5 +354,5 @@ fn budget(time: &BusTime) -> Budget {
             layout(6),
         )
         .frames("torques", time.joints.div_ceil(4), layout(8));
-    budget.bus_time("one auxiliary poll", time.auxiliary_poll_ns)
+    budget.bus_busy_time("one auxiliary poll", time.auxiliary_poll_ns)
 }

@@ -13,7 +13,8 @@ use supple_model::{Description, with_dof};
 use supple_puck::safety::{SafetyLimits, SpeedLimit};
 use supple_realtime::{Stop, apply_realtime_settings, diagnostics, pause, spin_duration};
 
-/// Runs an arm until the end of the program; returns the counters if start-up succeeded.
+/// Runs an arm until a shutdown is requested or all cycles have run and returns its counters; `None` if only the budget of the bus
+/// was requested.
 ///
 /// # Errors
 /// [`CanError`] with the mismatch and the remedy.
@@ -95,6 +96,8 @@ fn run_joints<const N: usize>(
             link.spin(spin_duration(options.spin_us));
         }
         first = false;
+        // An arm falls while it has no power: it is in its home pose, and its sensor unloaded, at the first start-up alone.
+        (startup_config.zero_at_rad, startup_config.tare) = (None, false);
         let mut plant = cycle(bus, link, ready, &config, cycle_config)?;
         let names = config.joint_names;
         let ended = serve(&mut plant, options.cycles, stop, names.as_slice())?;

@@ -160,7 +160,7 @@ fn check_rate(
         arm: description.name().to_owned(),
     })?;
     let budget = budget(rates(bus), joints);
-    let budget = budget.time("the controller's answer", cycle_config.answer_ns);
+    let budget = budget.off_bus_time("the controller's answer", cycle_config.answer_ns);
     if shown {
         println!("{}", budget.display(cycle_config.period_ns));
         let other = match rates(bus).has_fd() {
@@ -168,7 +168,7 @@ fn check_rate(
             false => BitRates::FD_1M_5M,
         };
         let other = super::budget(other, joints);
-        let other = other.time("the controller's answer", cycle_config.answer_ns);
+        let other = other.off_bus_time("the controller's answer", cycle_config.answer_ns);
         println!("\nWith the motors set to the other format:");
         println!("{}", other.display(cycle_config.period_ns));
     }

@@ -134,7 +134,7 @@ fn up_args(args: &DrillArgs, prefix: &str, trace: &Path) -> UpArgs {
         trace: Some(trace.to_owned()),
         prefix: Some(prefix.to_owned()),
         no_realtime: args.no_realtime,
-        ..UpArgs::bare(PlantKind::Emu, args.urdf.name(&args.arm))
+        ..UpArgs::with_defaults(PlantKind::Emu, args.urdf.name(&args.arm))
     }
 }
 
