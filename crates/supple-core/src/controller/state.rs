@@ -73,6 +73,8 @@ pub struct State<const N: usize> {
     pub(super) drives_active: bool,
     /// Cycle in which the drives became active last.
     activated_cycle: u64,
+    /// First and last cycle of those in a row in which a collision threshold was exceeded.
+    pub(super) exceeded_cycles: (u64, u64),
     pub(super) plausibility: Plausibility<N>,
     pub(super) stuck_encoders: StuckEncoders<N>,
     pub(super) oscillation: Oscillation<N>,
@@ -118,6 +120,7 @@ impl<const N: usize> State<N> {
             terms: Terms::default(),
             drives_active: false,
             activated_cycle: 0,
+            exceeded_cycles: (0, 0),
             plausibility: Plausibility::default(),
             stuck_encoders: StuckEncoders::default(),
             oscillation: Oscillation::default(),

@@ -23,6 +23,8 @@ use crate::trajectory::Reference;
 const ACTIVATION_S: f64 = 0.05;
 /// Factor of the collision thresholds within it.
 const ACTIVATION_RATIO: f64 = 2.0;
+/// Time for which a swing exceeds the thresholds at most \[s\]. What exceeds them for longer is a collision all the same.
+const SWING_S: f64 = 0.008;
 
 /// Whether the pose is regular, so that the tip force can be estimated from the joint torques.
 fn is_regular<const N: usize>(task: &Task<N>) -> bool {
@@ -286,16 +288,22 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// A collision, judged again with raised thresholds if the drives have just become active.
+    /// A collision, judged again if the drives have just become active: with raised thresholds unless it lasts.
     #[cold]
     #[inline(never)]
     fn unless_activated(
-        &self,
+        &mut self,
         config: &Config<N>,
         fault: Fault,
         check: impl FnOnce(f64) -> Result<(), Fault>,
     ) -> Result<(), Fault> {
-        match self.activated_within(config, ACTIVATION_S) {
+        let cycle = self.cycle.unwrap_or(0);
+        let (first, last) = self.exceeded_cycles;
+        let goes_on = cycle.wrapping_sub(last) <= 1;
+        let first = if goes_on { first } else { cycle };
+        self.exceeded_cycles = (first, cycle);
+        let lasts = cycle.wrapping_sub(first) as f64 * config.period_s > SWING_S;
+        match self.activated_within(config, ACTIVATION_S) && !lasts {
             true => check(ACTIVATION_RATIO),
             false => Err(fault),
         }
