@@ -42,7 +42,8 @@ fn faults_collisions_and_invalid_requests_give_the_expected_results() {
         "sim/track/stiff-drives-idle-and-back",
         "sim/track/too-fast-request",
         "emu/move/bump:joint=3",
-        "emu/track/drives-idle-and-back",
+        "emu/track_pose/drives-idle-at-home-and-back-realistic",
+        "emu/move/e-stop",
     ];
     for name in wanted {
         arguments.extend(["--only", name]);

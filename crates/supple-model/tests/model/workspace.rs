@@ -117,7 +117,7 @@ fn errors_name_entry_and_value() {
     let cases: Vec<(String, [&str; 2])> = vec![
         (
             wall("[0.0, 0.0, 0.0]"),
-            ["[[workspace.wall]] normal", "direction"],
+            ["[[workspace.wall]] normal", "finite and not zero"],
         ),
         (
             wall("[0.0, inf, 0.0]"),
@@ -144,7 +144,7 @@ fn errors_name_entry_and_value() {
             std::iter::repeat_n(wall("[0.0, 0.0, 1.0]"), 9)
                 .collect::<Vec<_>>()
                 .join("\n"),
-            ["[workspace] borders", "the limit is 8"],
+            ["[workspace] wall", "the limit is 8; keep_in counts as six"],
         ),
     ];
     for (text, parts) in cases {

@@ -57,7 +57,7 @@ fn frames_carry_eight_bytes() {
     let error = CanFrame::from_raw(1, &[0; 9]).unwrap_err();
     assert_eq!(
         error.to_string(),
-        "payload has 9 bytes, a frame carries at most 8"
+        "payload has 9 bytes, a classic frame carries at most 8"
     );
     assert_eq!(frame(0x404, &[0x30]).payload(), [0x30]);
 }

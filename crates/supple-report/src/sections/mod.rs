@@ -53,13 +53,10 @@ pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
         runs.push((format!("sinusoid, exact model, {name}"), &tracking.ended));
     }
     for (kind, runs_by_stiffness) in [
-        ("friction feed-forward faded in contact", &summary.probing),
-        (
-            "friction feed-forward kept in contact",
-            &summary.probing_fade_off,
-        ),
+        ("fade on", &summary.probing),
+        ("fade off", &summary.probing_fade_off),
         ("exact model", &summary.probing_exact_model),
-        ("block of rubber", &summary.probing_rubber),
+        ("rubber", &summary.probing_rubber),
         ("apparent inertia", &summary.probing_apparent_inertia),
     ] {
         for run in runs_by_stiffness {

@@ -31,6 +31,8 @@ const RAMPED_BLOCK_CLEARANCE_M: f64 = 0.004;
 const CAP_M: f64 = 0.02;
 /// Observation time after the event \[s\].
 const OBSERVED_S: f64 = 1.5;
+/// Time from the emergency stop until its release \[s\].
+const RELEASE_S: f64 = 0.5;
 /// Time from disabling the drives until the operator activates them again \[s\].
 const REENABLE_S: f64 = 1.0;
 /// Time in which an arm with idle drives sinks from its home pose onto its stops \[s\].
@@ -287,7 +289,11 @@ fn presses(spec: &Spec, times: &Times) -> Vec<String> {
             vec![at("idle", 0.0), at("activate", back_s)]
         }
         // The arm loses its positions with its power: there is no way back without a new start.
-        Event::Drives(DriveShutdown::EStop) => vec![at("e-stop", 0.0)],
+        Event::Drives(DriveShutdown::EStop) => vec![
+            at("e-stop", 0.0),
+            at("release", RELEASE_S),
+            at("idle", RELEASE_S + 0.1),
+        ],
         Event::Activation(_) => vec![at("activate", back_s)],
         _ => Vec::new(),
     }
@@ -310,8 +316,19 @@ fn run<const N: usize>(
         let telemetry = system.poll_telemetry()?;
         samples.extend(telemetry.as_ref().map(ControllerSample::of));
         refusals.extend(system.refusals()?);
-        if telemetry.is_none() && system.clock_has_ended()? {
-            break;
+        if telemetry.is_none() {
+            match system.clock_has_ended() {
+                Ok(true) => break,
+                Ok(false) => {}
+                // The arm's pose is not taken for its home pose again.
+                Err(Failure::ProcessEnded { .. })
+                    if spec.event == Event::Drives(DriveShutdown::EStop) =>
+                {
+                    let _ = system.end();
+                    return Ok((samples, refusals));
+                }
+                Err(failure) => return Err(failure),
+            }
         }
         if begin.elapsed() > TIMEOUT {
             return Err(Failure::DidNotReachTracking);
