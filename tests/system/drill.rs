@@ -64,10 +64,9 @@ fn faults_collisions_and_invalid_requests_give_the_expected_results() {
     }
     assert_eq!(code, Some(0), "{stderr}");
     let page = std::fs::read_to_string(page).expect("a page");
-    assert!(
-        page.contains("9 of 9 test cases gave the expected result"),
-        "{page}"
-    );
+    let count = wanted.len();
+    let result = format!("{count} of {count} test cases gave the expected result");
+    assert!(page.contains(&result), "{page}");
     assert!(page.contains("| sim/move/encoder-sign:joint=1 |"), "{page}");
 }
 
