@@ -226,6 +226,12 @@ fn a_motion_beyond_the_limits_is_repeated_more_slowly_or_refused() {
         matches!(beyond, Err(RepetitionError::Refused { .. })),
         "{beyond:?}"
     );
+    // Slower than the controller accepts set-points.
+    let too_slow = Repetition::plan(&arm.controller, &shown, 0.04);
+    assert!(
+        matches!(too_slow, Err(RepetitionError::TooSlow { speed: 0.04, .. })),
+        "{too_slow:?}"
+    );
     let rest = Repetition::<N>::plan(&arm.controller, &RecordedMotion::default(), 1.0);
     assert_eq!(rest, Err(RepetitionError::NoMotion));
 }

@@ -168,7 +168,7 @@ pub enum Fault {
         /// Limit \[N\].
         limit_n: f64,
     },
-    /// A joint swings to and fro ever faster: torques or angles come later than configured, or the model is wrong.
+    /// A joint oscillates with growing speed: torques or angles come later than configured, or the model is wrong.
     Oscillation {
         /// Joint index.
         joint: usize,
@@ -368,7 +368,7 @@ impl NamesJoints for Fault {
                 limit_rad_per_s,
             } => write!(
                 f,
-                "{} oscillates ever faster, at {value_rad_per_s:.3} rad/s, limit {limit_rad_per_s:.3} rad/s: torques or \
+                "{} oscillates with growing speed, {value_rad_per_s:.3} rad/s, limit {limit_rad_per_s:.3} rad/s: torques or \
                  angles come late, or the gains are too high",
                 label(joint)
             ),

@@ -1,4 +1,4 @@
-//! A joint that swings to and fro ever faster: its loop is unstable, because torques or angles come later than the
+//! A joint that oscillates with growing speed: its loop is unstable, because torques or angles come later than the
 //! configuration says, or because the inertia of the model is wrong.
 //!
 //! The peaks of the speed are compared from one reversal of the joint to the next. After a blow they fall, and a hand
@@ -11,7 +11,7 @@ use crate::math::{Vector, abs};
 const TURNED_RAD_PER_S: f64 = 0.04;
 /// Longest time from one reversal to the next, half a period \[s\].
 const MAX_SWING_S: f64 = 0.08;
-/// Times in a row that the peak has grown.
+/// Times in a row that the peak grows until it is a fault.
 const GROWTHS: u32 = 3;
 /// Peak as a fraction of the speed limit.
 const SPEED_SHARE: f64 = 0.15;
@@ -23,9 +23,11 @@ pub(super) struct Oscillation<const N: usize> {
     fastest_rad_per_s: Vector<N>,
     /// Peak of the swing before \[rad/s\].
     last_peak_rad_per_s: Vector<N>,
-    /// Time since the joint turned round, of `now_s` \[s\].
+    /// When the joint turned round last \[s\].
     turned_s: Vector<N>,
+    /// Time since the start, of which `turned_s` are values \[s\].
     now_s: f64,
+    /// Times in a row that each joint's peak has grown.
     growths: [u32; N],
 }
 
@@ -55,11 +57,11 @@ impl<const N: usize> Oscillation<N> {
         for joint in 0..N {
             let (velocity, fastest) = (velocity_rad_per_s[joint], self.fastest_rad_per_s[joint]);
             if velocity * fastest < -TURNED_RAD_PER_S * abs(fastest) {
-                self.turn(joint, velocity);
+                self.end_swing(joint, velocity);
             } else if abs(velocity) > abs(fastest) {
                 self.fastest_rad_per_s[joint] = velocity;
                 if self.growths[joint] >= GROWTHS - 1 {
-                    result = result.and(self.grow(joint, limit_rad_per_s[joint]));
+                    result = result.and(self.judge_swing(joint, limit_rad_per_s[joint]));
                 }
             }
         }
@@ -69,9 +71,9 @@ impl<const N: usize> Oscillation<N> {
     /// Ends a swing of a joint.
     #[cold]
     #[inline(never)]
-    fn turn(&mut self, joint: usize, velocity: f64) {
+    fn end_swing(&mut self, joint: usize, velocity: f64) {
         let peak = abs(self.fastest_rad_per_s[joint]);
-        self.growths[joint] = match self.grows(joint, peak) {
+        self.growths[joint] = match self.has_grown(joint, peak) {
             true => self.growths[joint] + 1,
             false => 0,
         };
@@ -81,7 +83,7 @@ impl<const N: usize> Oscillation<N> {
     }
 
     /// Whether this peak is that of a quick swing, and higher than the last one.
-    fn grows(&self, joint: usize, peak: f64) -> bool {
+    fn has_grown(&self, joint: usize, peak: f64) -> bool {
         let is_quick = self.now_s - self.turned_s[joint] <= MAX_SWING_S;
         is_quick && peak > self.last_peak_rad_per_s[joint]
     }
@@ -89,10 +91,10 @@ impl<const N: usize> Oscillation<N> {
     /// Judges a swing that may be the last of those that grow, before it ends.
     #[cold]
     #[inline(never)]
-    fn grow(&self, joint: usize, speed_limit: f64) -> Result<(), Fault> {
+    fn judge_swing(&self, joint: usize, speed_limit: f64) -> Result<(), Fault> {
         let value_rad_per_s = abs(self.fastest_rad_per_s[joint]);
         let limit_rad_per_s = SPEED_SHARE * speed_limit;
-        if self.grows(joint, value_rad_per_s) && value_rad_per_s > limit_rad_per_s {
+        if self.has_grown(joint, value_rad_per_s) && value_rad_per_s > limit_rad_per_s {
             return Err(Fault::Oscillation {
                 joint,
                 value_rad_per_s,

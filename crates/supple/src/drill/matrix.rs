@@ -22,6 +22,17 @@ const FAULT_AND_STOP_MS: f64 = 600.0;
 /// The same for faults that become observable only after some motion \[ms\].
 const LATE_FAULT_AND_STOP_MS: f64 = 1100.0;
 
+/// Tasks in which faults of torques and of gravity are tried.
+const WITH_TORQUE: &[TestTask] = &[
+    TestTask::GravityHold,
+    TestTask::Move,
+    TestTask::Track,
+    TestTask::TrackStiff,
+    TestTask::Float,
+    TestTask::JointImpedance,
+    TestTask::TrackPose,
+    TestTask::Breakaway,
+];
 /// Valid faults when the arm hits an obstacle.
 const CONTACT_FAULTS: &[&str] = &[
     "joint_collision",
@@ -448,16 +459,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     // Motors.
     let dead = injected(Kind::MotorDead { motor: 1 });
     add(
-        &[
-            GravityHold,
-            Move,
-            Track,
-            TrackStiff,
-            Float,
-            JointImpedance,
-            TrackPose,
-            Breakaway,
-        ],
+        WITH_TORQUE,
         dead,
         stops(WRONG_DIRECTION_FAULTS),
         FAULT_AND_STOP_MS,
@@ -494,16 +496,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     }
     let later = injected(Kind::TorqueLate { cycles: 3 });
     add(
-        &[
-            GravityHold,
-            Move,
-            Track,
-            TrackStiff,
-            Float,
-            JointImpedance,
-            TrackPose,
-            Breakaway,
-        ],
+        WITH_TORQUE,
         later,
         runs_or_faults(DISTURBANCE_FAULTS),
         LATE_FAULT_AND_STOP_MS,
@@ -511,16 +504,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     for cycles in [10, 20] {
         let far_later = injected(Kind::TorqueLate { cycles });
         add(
-            &[
-                GravityHold,
-                Move,
-                Track,
-                TrackStiff,
-                Float,
-                JointImpedance,
-                TrackPose,
-                Breakaway,
-            ],
+            WITH_TORQUE,
             far_later,
             runs_or_faults(LATE_TORQUE_FAULTS),
             LATE_FAULT_AND_STOP_MS,
@@ -530,16 +514,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     // Unmodelled effects.
     let gravity = Kind::GravityReversed;
     add(
-        &[
-            GravityHold,
-            Move,
-            Track,
-            TrackStiff,
-            Float,
-            JointImpedance,
-            TrackPose,
-            Breakaway,
-        ],
+        WITH_TORQUE,
         injected(gravity),
         stops(WRONG_DIRECTION_FAULTS),
         FAULT_AND_STOP_MS,

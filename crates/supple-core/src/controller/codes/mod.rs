@@ -117,7 +117,7 @@ numbered_variants! {
     SINGULAR = 23 "singular": Fault::Singular => [NO_JOINT, 0.0, 0.0],
     /// The encoder of a joint's motor stays unchanged under a torque that should move it.
     ENCODER_UNMOVED = 24 "encoder_unmoved": Fault::EncoderUnmoved { joint, value_nm, limit_nm } => [index(joint), value_nm, limit_nm],
-    /// A joint swings to and fro ever faster.
+    /// A joint oscillates with growing speed.
     OSCILLATION = 25 "oscillation": Fault::Oscillation { joint, value_rad_per_s, limit_rad_per_s } => [index(joint), value_rad_per_s, limit_rad_per_s],
 }
 

@@ -1,4 +1,4 @@
-//! A joint that swings to and fro ever faster is a fault, before it is fast; one that swings otherwise is none.
+//! A joint that oscillates with growing speed is a fault before it is fast; other oscillations are none.
 
 use crate::support::configs::four;
 use crate::support::plant::{Plant, nothing};
