@@ -94,6 +94,70 @@ def test_gains_change_along_a_ramp(system):
     np.testing.assert_array_equal(system.wait(0.2).stiffness_n_per_m, [10.0, 20.0, 30.0])
 
 
+def rotation(vector):
+    """Rotation matrix of axis times angle."""
+    angle = np.linalg.norm(vector)
+    x, y, z = vector / angle
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+
+
+@pytest.fixture
+def pose_system():
+    system = supple.simulated(supple.Arm.load("openarm"))
+    system.turn([0.0, 0.0, 1.0], 0.0, 0.1)
+    assert system.state.mode == "track_pose"
+    return system
+
+
+def test_the_tip_turns_while_its_position_stays(pose_system):
+    pose_system.gains(stiffness_n_per_m=200.0, damping_n_s_per_m=20.0)
+    pose_system.rotational_gains(5.0, 0.2)
+    pose_system.wait(1.0)
+    before = pose_system.state
+    after = pose_system.turn([0.0, 0.0, 2.0], 0.2, 2.0) and pose_system.wait(1.0)
+    np.testing.assert_allclose(after.tip_position_m, before.tip_position_m, atol=5e-3)
+    assert np.linalg.norm(after.columns["rotation_error_rad"]) < 0.05
+    turned = [rotation(state.columns["reference_rotation_rad"]) for state in (before, after)]
+    angle = 0.2
+    expected = np.array([[np.cos(angle), -np.sin(angle), 0.0], [np.sin(angle), np.cos(angle), 0.0], [0.0, 0.0, 1.0]])
+    np.testing.assert_allclose(turned[1] @ turned[0].T, expected, atol=1e-9)
+
+
+def test_full_matrices_of_stiffness_and_damping(pose_system):
+    stiffness = np.array([[50.0, 10.0, 0.0], [10.0, 40.0, 0.0], [0.0, 0.0, 30.0]])
+    pose_system.gains(stiffness, np.diag([3.0, 3.0, 3.0]), axes="tip", ramp_s=0.1)
+    pose_system.rotational_gains(np.diag([1.0, 2.0, 3.0]), 0.05, ramp_s=0.1)
+    state = pose_system.wait(0.3)
+    assert (state.mode, state.fault) == ("track_pose", None)
+    indefinite = stiffness - 60.0 * np.eye(3)
+    with pytest.raises(supple.Refused, match="eigenvalue of the stiffness matrix"):
+        pose_system.gains(indefinite, np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("call", "parts"),
+    [
+        (lambda s: s.gains(np.eye(3)), ["damping_n_s_per_m", "(3, 3)", "nothing"]),
+        (lambda s: s.gains(np.eye(2), np.eye(2)), ["stiffness_n_per_m", "(3, 3)", "(2, 2)"]),
+        (lambda s: s.gains(np.tri(3), np.eye(3)), ["stiffness_n_per_m", "symmetric"]),
+        (lambda s: s.gains(np.eye(3), np.eye(3), axes="world"), ["axes", "'tip'", "'world'"]),
+        (lambda s: s.rotational_gains([1.0, 2.0], 0.1), ["stiffness_nm_per_rad", "(2,)"]),
+        (lambda s: s.turn([0.0, 0.0, 0.0], 0.1, 1.0), ["axis", "direction"]),
+    ],
+)
+def test_errors_of_the_pose_name_the_argument(pose_system, call, parts):
+    with pytest.raises(ValueError) as error:
+        call(pose_system)
+    for part in parts:
+        assert part in str(error.value)
+
+
+def test_matrices_need_six_active_joints(system):
+    with pytest.raises(supple.Refused, match="active"):
+        system.gains(np.eye(3), np.eye(3))
+
+
 @pytest.mark.parametrize("rate_hz", [20.0, 100.0, 1000.0])
 def test_set_points_follow_the_curve_at_any_rate(rate_hz):
     # Stiff enough that friction moves the tip by millimetres at most: at 5 N/m it is 8 mm for any motion like this.

@@ -14,9 +14,9 @@ pub mod drives;
 pub mod registry;
 
 mod backend;
+mod cycles;
 mod options;
 mod program;
-mod serve;
 
 pub use backend::{DriveBackend, RunError};
 pub use drives::barrett::bus_time::{Budget, BusTime, Overload};

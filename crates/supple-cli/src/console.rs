@@ -3,7 +3,6 @@
 use crate::exit::Failure;
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
-use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use supple_realtime::diagnostics;
@@ -16,9 +15,7 @@ pub fn print_line(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     let written = writeln!(out, "{text}").and_then(|()| out.flush());
     match written {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
-            Err(Failure::file("write", Path::new("standard output"), error))
-        }
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::standard_output(error)),
         _ => Ok(()),
     }
 }

@@ -220,11 +220,17 @@ pub enum Failure {
         "--misbehave is for emulated Damiao motors: use --plant emu with an arm that has [bus], such as openarm or yam"
     )]
     MisbehaviourWithoutMotors,
-    /// Plant options were given for a real arm.
+    /// Options of a simulated arm were given for a real one.
     #[error(
-        "--plant-options and --realistic work only with a simulated arm: use --plant sim or --plant emu"
+        "--plant-options, --realistic, --block-m, --trace and --start-error work only with a simulated arm: use --plant sim or --plant emu"
     )]
     OptionsOfRealArm,
+    /// An option of an arm on a bus was given for an arm without one.
+    #[error("{option} is for an arm on a bus: omit it, or use --plant emu or --plant can")]
+    NoBus {
+        /// The option.
+        option: &'static str,
+    },
     /// The hand of an emulated arm waits for a mode that it is never notified of.
     #[error(
         "the hand of an emulated arm does not learn when float begins: write `when = \"active\"` in its [hand] of the plant \
@@ -405,6 +411,16 @@ pub enum Failure {
 }
 
 impl Failure {
+    /// The error for a result that standard output does not take.
+    pub fn standard_output(error: std::io::Error) -> Failure {
+        Failure::File {
+            action: "write",
+            path: PathBuf::from("standard output"),
+            error,
+            remedy: "redirect it to a file or pipe with room",
+        }
+    }
+
     /// Creates the failure of a file operation, with a remedy for its error.
     pub fn file(action: &'static str, path: &Path, error: std::io::Error) -> Failure {
         use std::io::ErrorKind;
@@ -491,7 +507,7 @@ impl Failure {
             | Failure::ValueCount { .. } => 2,
             Failure::Injection(_) | Failure::InjectionIntoRealArm => 2,
             Failure::OptionsOfRealArm | Failure::MisbehaviourWithoutMotors => 2,
-            Failure::HandNeedsMode | Failure::NoSuchEffect { .. } => 2,
+            Failure::HandNeedsMode | Failure::NoBus { .. } | Failure::NoSuchEffect { .. } => 2,
             Failure::PlantOptions(error) => plant_options_code(error),
             Failure::NoSuchProcess { .. } | Failure::NoSuchTestCase { .. } => 2,
             Failure::Drill { .. } | Failure::DidNotReachTracking => 12,
@@ -631,6 +647,7 @@ mod tests {
             (Failure::FaultTestOnRealArm, "invalid command line"),
             (Failure::NoSuchProcess { name: "" }, "invalid command line"),
             (Failure::OptionsOfRealArm, "invalid command line"),
+            (Failure::NoBus { option: "" }, "invalid command line"),
             (Failure::MisbehaviourWithoutMotors, "invalid command line"),
             (
                 Failure::NoSuchEffect { text: text() },

@@ -313,6 +313,12 @@ impl Description {
         self.bus.as_ref()
     }
 
+    /// Whether the arm falls without torque: motors on a `[bus]` have no brakes, while those of a WAM brake when
+    /// shorted.
+    pub fn falls_without_torque(&self) -> bool {
+        self.bus.is_some()
+    }
+
     /// Whether the impedance law acts on each joint: on those that the TOML does not hold.
     pub fn active_joints(&self) -> Vec<bool> {
         self.joints

@@ -12,10 +12,12 @@
 //! Idle requests take priority over all others and are never queued behind them. A request for a cycle that is not after
 //! the last accepted idle is refused, however late it arrives. States of another arm are discarded and counted.
 
+use crate::deferred::is_motion;
 use crate::error::RtError;
 use crate::queues::{LoopIdleChannel, LoopQueues};
 use crate::request_queue::RequestQueue;
 use crate::timing::Timing;
+use core::fmt;
 use core::hint::black_box;
 use core::sync::atomic::Ordering;
 use core::time::Duration;
@@ -287,6 +289,8 @@ impl<const N: usize> ControlLoop<N> {
         let received = self.next_request(arm.cycle);
         let input = arm.input::<N>(received.as_ref().map(|(_, request)| *request))?;
         let had_fault = self.state.fault().is_some();
+        let deactivated = arm.drives() != Drives::Active
+            && (self.last.as_ref()).is_some_and(|last| last.arm.drives() == Drives::Active);
         let output = step(&self.controller, &mut self.state, &input);
         let step_ns = monotonic_ns() - begin_ns;
         if let Some((source, _)) = &received {
@@ -308,6 +312,13 @@ impl<const N: usize> ControlLoop<N> {
             _ => 0,
         };
         self.refuse_queued(ended, arm.cycle, output.mode);
+        if deactivated {
+            // Who activates the drives again expects no motion that was scheduled before.
+            let reason = &"the drives became inactive";
+            self.refuse_queued_if(arm.cycle, output.mode, reason, |_, request| {
+                is_motion(request)
+            });
+        }
         let timing = CycleTiming {
             period_ns: self.last_begin_ns.map_or(0, |last| begin_ns - last),
             latency_ns: match self.virtual_time {
@@ -432,22 +443,31 @@ impl<const N: usize> ControlLoop<N> {
     /// Refuses the first `count` queued requests, which were sent under other conditions; idle requests stay valid and
     /// are kept.
     fn refuse_queued(&mut self, count: usize, cycle: u64, mode: Mode) {
-        if count == 0 {
-            return;
+        if count > 0 {
+            let reason = &format_args!("the controller changed to mode {}", mode.name());
+            self.refuse_queued_if(cycle, mode, reason, |position, request| {
+                position < count && !request.requests_idle()
+            });
         }
+    }
+
+    /// Refuses the queued requests for which the condition on position and request holds.
+    fn refuse_queued_if(
+        &mut self,
+        cycle: u64,
+        mode: Mode,
+        reason: &dyn fmt::Display,
+        refused: impl Fn(usize, &OperatorRequest) -> bool,
+    ) {
         let mut kept = RequestQueue::default();
         for position in 0..self.queued.len() {
             let Some(request) = self.queued.pop() else {
                 break;
             };
-            let stays = position >= count || request.requests_idle();
-            if stays && kept.push(request).is_ok() {
+            if !refused(position, &request) && kept.push(request).is_ok() {
                 continue;
             }
-            let text = Text::of(&format_args!(
-                "refused: it was queued when the controller changed to mode {}",
-                mode.name()
-            ));
+            let text = Text::of(&format_args!("refused: it was queued when {reason}"));
             self.reply(&request, cycle, mode, Outcome::Refused, text);
         }
         self.queued = kept;

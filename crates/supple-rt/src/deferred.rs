@@ -113,6 +113,7 @@ pub struct WaitingMotions {
     queue: RequestQueue,
     fault: bool,
     mode: Option<Mode>,
+    drives_active: bool,
 }
 
 impl WaitingMotions {
@@ -142,14 +143,15 @@ impl WaitingMotions {
         self.queue.pop()
     }
 
-    /// Whether a cycle with this mode and fault ends what waits, as in the loop: a fault latches, or the mode becomes
-    /// idle.
-    pub fn is_ended_by(&mut self, mode: Option<Mode>, fault: bool) -> bool {
+    /// Whether a cycle ends what waits, as in the loop: a fault latches, the mode becomes idle, or the drives are no
+    /// longer active.
+    pub fn is_ended_by(&mut self, mode: Option<Mode>, fault: bool, drives_active: bool) -> bool {
         let latched = fault && !self.fault;
+        let deactivated = self.drives_active && !drives_active;
         // Before the first cycle the controller is idle already.
         let idle = mode == Some(Mode::Idle) && !matches!(self.mode, None | Some(Mode::Idle));
-        (self.fault, self.mode) = (fault, mode);
-        latched || idle
+        (self.fault, self.mode, self.drives_active) = (fault, mode, drives_active);
+        latched || idle || deactivated
     }
 }
 
@@ -273,11 +275,20 @@ mod tests {
     #[test]
     fn a_fault_and_idle_end_what_waits_once() {
         let mut waiting = WaitingMotions::default();
-        assert!(!waiting.is_ended_by(Some(Mode::Idle), false));
-        assert!(!waiting.is_ended_by(Some(Mode::Move), false));
-        assert!(waiting.is_ended_by(Some(Mode::Fault), true));
-        assert!(!waiting.is_ended_by(Some(Mode::Fault), true));
-        assert!(waiting.is_ended_by(Some(Mode::Idle), false));
-        assert!(!waiting.is_ended_by(Some(Mode::Idle), false));
+        for (mode, fault, drives_active, ended) in [
+            (Mode::Idle, false, false, false),
+            (Mode::GravityHold, false, false, false),
+            (Mode::Move, false, true, false),
+            (Mode::Fault, true, true, true),
+            (Mode::Fault, true, true, false),
+            (Mode::Idle, false, true, true),
+            (Mode::Idle, false, true, false),
+            (Mode::Track, false, true, false),
+            (Mode::GravityHold, false, false, true),
+            (Mode::GravityHold, false, false, false),
+        ] {
+            let found = waiting.is_ended_by(Some(mode), fault, drives_active);
+            assert_eq!(found, ended, "{mode:?}, {fault}, {drives_active}");
+        }
     }
 }

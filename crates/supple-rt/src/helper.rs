@@ -14,7 +14,7 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::{Builder, JoinHandle};
 use supple_core::Vector;
 use supple_core::controller::{Controller, Mode, NamesJoints, Request, check_motion};
-use supple_ipc::message::{OperatorReply, OperatorRequest, Outcome, Text};
+use supple_ipc::message::{Drives, OperatorReply, OperatorRequest, Outcome, Text};
 use supple_ipc::{Backpressure, Domain, IpcError, OperatorServer};
 use supple_realtime::{diagnostics, pause};
 
@@ -283,8 +283,7 @@ impl HelperState {
     fn end_motions(&mut self) {
         self.plan.ended();
         while let Some(request) = self.waiting.take() {
-            let text =
-                "refused: while it waited, a mode at rest was requested or a fault was latched";
+            let text = "refused: while it waited, a mode at rest was requested, a fault was latched or the drives became inactive";
             self.refuse_waiting(&request, text);
         }
     }
@@ -308,7 +307,8 @@ impl HelperState {
             self.position_rad = Some(record.position_rad.into());
             self.cycle = telemetry.state.cycle;
             self.plan.cycle(self.cycle);
-            if self.waiting.is_ended_by(record.mode(), record.fault != 0) {
+            let active = telemetry.state.drives() == Drives::Active;
+            if (self.waiting).is_ended_by(record.mode(), record.fault != 0, active) {
                 self.end_motions();
             }
             for request in (self.learning)(&telemetry) {

@@ -188,6 +188,31 @@ fn queued_requests_are_refused_on_idle_or_fault() {
     }
 }
 
+/// Who activates the drives again expects no motion that was scheduled before.
+#[test]
+fn queued_motions_are_refused_when_the_drives_become_inactive() {
+    let mut bench = Bench::new(true);
+    bench.request(&Request::GravityHold, None);
+    bench.cycle(Drives::Active);
+    let motion = Request::Move {
+        target_rad: bench.home_rad,
+        duration_s: 1.0,
+    };
+    bench.request(&motion, Some(6));
+    bench.request(&Request::GravityHold, Some(6));
+    bench.cycle(Drives::Active);
+    bench.cycle(Drives::Idle);
+    let refused: Vec<u64> = (bench.replies().iter())
+        .filter(|reply| reply.outcome() == Outcome::Refused)
+        .map(|reply| reply.sequence)
+        .collect();
+    assert_eq!(refused, [2]);
+    while bench.cycle < 10 {
+        let answer = bench.active_cycle();
+        assert_eq!(answer.mode(), Some(Mode::GravityHold), "{}", bench.cycle);
+    }
+}
+
 #[test]
 fn request_for_another_arm_is_refused_with_a_text() {
     let mut bench = Bench::new(true);

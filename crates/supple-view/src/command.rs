@@ -1,7 +1,7 @@
 //! What the page and other viewers may ask of the arm. Each becomes a request that the controller checks, or a press of
 //! a button of the emulated pendant.
 
-use crate::frame::Frame;
+use crate::snapshot::Snapshot;
 use serde::Deserialize;
 use supple_core::Trajectory;
 use supple_core::config::Gains;
@@ -123,10 +123,10 @@ impl Command {
 pub const PARAMETERS: [&str; 2] = ["stiffness_n_per_m", "damping_n_s_per_m"];
 
 /// The value of a parameter.
-pub fn parameter(frame: &Frame, name: &str) -> Option<[f32; 3]> {
+pub fn parameter(snapshot: &Snapshot, name: &str) -> Option<[f32; 3]> {
     match PARAMETERS.iter().position(|known| *known == name)? {
-        0 => Some(frame.stiffness_n_per_m),
-        _ => Some(frame.damping_n_s_per_m),
+        0 => Some(snapshot.stiffness_n_per_m),
+        _ => Some(snapshot.damping_n_s_per_m),
     }
 }
 

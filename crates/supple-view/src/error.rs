@@ -27,7 +27,7 @@ pub enum ViewError {
         /// Error of the operating system.
         error: io::Error,
     },
-    /// A picture cannot be represented as JSON, a bug.
-    #[error("a picture cannot be encoded: {0}")]
+    /// A snapshot cannot be represented as JSON, a bug.
+    #[error("a snapshot cannot be encoded: {0}")]
     Encode(#[from] serde_json::Error),
 }

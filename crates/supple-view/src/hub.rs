@@ -1,10 +1,10 @@
-//! What the threads share: the viewers that are connected, the latest picture, and commands on their way.
+//! What the threads share: the viewers that are connected, the latest snapshot, and commands on their way.
 //!
 //! A viewer has a queue of bounded length. If it is slow its oldest messages are dropped; nobody waits for it.
 
 use crate::command::Command;
-use crate::frame::Frame;
 use crate::protocol::{Channel, message_data};
+use crate::snapshot::Snapshot;
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -70,7 +70,7 @@ impl Viewer {
 pub struct Hub {
     channels: Vec<Channel>,
     viewers: Mutex<BTreeMap<u64, Arc<Viewer>>>,
-    latest: Mutex<Option<Frame>>,
+    latest: Mutex<Option<Snapshot>>,
     /// Messages that a channel repeats to each new subscriber, such as the arm's description.
     retained: Mutex<BTreeMap<u32, Vec<u8>>>,
     commands: Mutex<Option<Sender<Pending>>>,
@@ -157,14 +157,14 @@ impl Hub {
         }
     }
 
-    /// The latest picture.
-    pub fn latest(&self) -> Option<Frame> {
+    /// The latest snapshot.
+    pub fn latest(&self) -> Option<Snapshot> {
         lock(&self.latest).clone()
     }
 
     /// Replaces it.
-    pub fn set_latest(&self, frame: Frame) {
-        *lock(&self.latest) = Some(frame);
+    pub fn set_latest(&self, snapshot: Snapshot) {
+        *lock(&self.latest) = Some(snapshot);
     }
 }
 

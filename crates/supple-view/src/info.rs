@@ -1,4 +1,4 @@
-//! What the page must receive before the first picture, as JSON.
+//! What the page must receive before the first snapshot, as JSON.
 
 use crate::error::ViewError;
 use crate::protocol::Channel;
@@ -54,7 +54,7 @@ pub fn info(subject: &Subject<'_>) -> Result<Vec<u8>, ViewError> {
     Ok(info.to_string().into_bytes())
 }
 
-/// The channels of a running system: the pictures, and those of a log.
+/// The channels of a running system: the snapshots, and those of a log.
 ///
 /// # Errors
 /// [`ViewError::Log`].
@@ -67,12 +67,12 @@ pub fn channels(description: &Description) -> Result<Vec<Channel>, ViewError> {
         schema_encoding: "ros2msg",
         schema: channel.schema,
     });
-    let pictures = Channel {
+    let snapshots = Channel {
         topic: "/view".to_owned(),
         encoding: "json",
         schema_name: "supple.View".to_owned(),
         schema_encoding: "jsonschema",
         schema: r#"{"type":"object"}"#.to_owned(),
     };
-    Ok([pictures].into_iter().chain(of_log).collect())
+    Ok([snapshots].into_iter().chain(of_log).collect())
 }

@@ -17,7 +17,6 @@
 mod calls;
 mod command;
 mod error;
-mod frame;
 mod http;
 mod hub;
 mod info;
@@ -28,6 +27,7 @@ mod protocol;
 mod remedy;
 mod replay;
 mod server;
+mod snapshot;
 mod token;
 mod viewer;
 
@@ -136,7 +136,7 @@ fn shown_log(log: &std::path::Path, options: &Options) -> Result<Shown, ViewErro
         domain: None,
         name: subject.title.clone(),
         info: info::info(&subject)?,
-        log: Some(serde_json::to_vec(&replay.frames)?),
+        log: Some(serde_json::to_vec(&replay.snapshots)?),
     })
 }
 
@@ -167,7 +167,7 @@ fn run_live<const N: usize>(
         hub: hub.clone(),
         log: None,
     };
-    let mut live = Live::<N>::new(domain, description, &hub, !options.read_only)?;
+    let mut live = LiveConnection::<N>::new(domain, description, &hub, !options.read_only)?;
     announce(&start(options, shown)?);
     live.run(&commands, stop)
 }

@@ -2,8 +2,8 @@
 //! polls: it has no way to delay the controller.
 
 use crate::error::ViewError;
-use crate::frame::{Beside, Reducer};
 use crate::hub::{Answer, Hub, Pending};
+use crate::snapshot::{CycleExtras, SnapshotBuilder};
 use core::time::Duration;
 use std::sync::mpsc::{Receiver, Sender};
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
@@ -13,12 +13,12 @@ use supple_log::{CycleTiming, Extras, LiveEncoder};
 use supple_model::Description;
 use supple_realtime::{Stop, monotonic_ns, pause};
 
-/// Channel of the pictures; the channels of the log follow it.
+/// Channel of the snapshots; the channels of the log follow it.
 pub const VIEW_CHANNEL: u32 = 0;
 /// Time between two polls. The queue of telemetry holds two seconds at 1 kHz.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
-/// Time between two pictures.
-const FRAME_INTERVAL: Duration = Duration::from_millis(33);
+/// Time between two snapshots.
+const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(33);
 /// Time between two messages of each channel of the log \[ns\].
 const MESSAGE_INTERVAL_NS: u64 = 10_000_000;
 /// How long a request waits for its reply.
@@ -32,12 +32,12 @@ struct Sent {
 }
 
 /// Connection to a running system of an arm with `N` joints.
-pub struct Live<'a, const N: usize> {
+pub struct LiveConnection<'a, const N: usize> {
     hub: &'a Hub,
     reader: TelemetryReader,
     operator: Option<OperatorClient>,
     encoder: LiveEncoder<N>,
-    reducer: Reducer<N>,
+    builder: SnapshotBuilder<N>,
     last: Option<Telemetry>,
     sent: Vec<Sent>,
     /// From the stamps of states to the time since the epoch \[ns\].
@@ -45,7 +45,7 @@ pub struct Live<'a, const N: usize> {
     next_message_ns: u64,
 }
 
-impl<'a, const N: usize> Live<'a, N> {
+impl<'a, const N: usize> LiveConnection<'a, N> {
     /// Connects; as an operator too if `commands` is set.
     ///
     /// # Errors
@@ -60,12 +60,12 @@ impl<'a, const N: usize> Live<'a, N> {
         let mut encoder = LiveEncoder::new(description)?;
         let urdf = encoder.robot_description()?;
         hub.retain(channel_of(urdf.channel), urdf.data);
-        Ok(Live {
+        Ok(LiveConnection {
             hub,
             reader: TelemetryReader::new(domain)?,
             operator: operator.transpose()?,
             encoder,
-            reducer: Reducer::default(),
+            builder: SnapshotBuilder::default(),
             last: None,
             sent: Vec::new(),
             offset_ns: since_epoch_ns().saturating_sub(monotonic_ns()),
@@ -78,14 +78,14 @@ impl<'a, const N: usize> Live<'a, N> {
     /// # Errors
     /// [`ViewError::Ipc`] if shared memory cannot be accessed; [`ViewError::Log`] for a message that cannot be encoded.
     pub fn run(&mut self, commands: &Receiver<Pending>, stop: &Stop) -> Result<(), ViewError> {
-        let mut shown = Instant::now();
+        let mut last_snapshot = Instant::now();
         while !stop.shutdown_requested() {
             while let Some(telemetry) = self.reader.receive()? {
                 self.add(&telemetry)?;
             }
-            if shown.elapsed() >= FRAME_INTERVAL {
-                shown = Instant::now();
-                self.show();
+            if last_snapshot.elapsed() >= SNAPSHOT_INTERVAL {
+                last_snapshot = Instant::now();
+                self.publish_snapshot();
             }
             while let Ok(pending) = commands.try_recv() {
                 self.send(pending)?;
@@ -103,7 +103,7 @@ impl<'a, const N: usize> Live<'a, N> {
         let record = telemetry.record_of::<N>();
         let timing = &telemetry.timing;
         let microseconds = |ns: u64| ns as f64 / 1e3;
-        let beside = Beside {
+        let extras = CycleExtras {
             time_s: telemetry.state.stamp_ns as f64 / 1e9,
             timing_us: Some([
                 microseconds(timing.period_ns),
@@ -114,7 +114,7 @@ impl<'a, const N: usize> Live<'a, N> {
             missed: telemetry.state.plant.missed,
             held: telemetry.state.drives() == Drives::Held,
         };
-        self.reducer.add(&record, beside);
+        self.builder.add(&record, extras);
         self.last = Some(*telemetry);
         let time_ns = telemetry.state.stamp_ns.saturating_add(self.offset_ns);
         // The clock of the states begins anew with the plant.
@@ -139,15 +139,15 @@ impl<'a, const N: usize> Live<'a, N> {
         Ok(())
     }
 
-    fn show(&mut self) {
-        let Some(frame) = self.reducer.take() else {
+    fn publish_snapshot(&mut self) {
+        let Some(snapshot) = self.builder.take() else {
             return;
         };
-        let time_ns = ((frame.time_s * 1e9) as u64).saturating_add(self.offset_ns);
-        if let Ok(json) = serde_json::to_vec(&frame) {
+        let time_ns = ((snapshot.time_s * 1e9) as u64).saturating_add(self.offset_ns);
+        if let Ok(json) = serde_json::to_vec(&snapshot) {
             self.hub.publish(VIEW_CHANNEL, time_ns, &json);
         }
-        self.hub.set_latest(frame);
+        self.hub.set_latest(snapshot);
     }
 
     fn send(&mut self, pending: Pending) -> Result<(), ViewError> {

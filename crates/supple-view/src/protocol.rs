@@ -4,7 +4,7 @@
 //! Written here and not taken from the Foxglove SDK: its server accepts whoever connects, and this one moves an arm.
 
 use crate::command::{PARAMETERS, SCHEMA, parameter};
-use crate::frame::Frame;
+use crate::snapshot::Snapshot;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -144,10 +144,10 @@ pub fn advertise_services() -> String {
 }
 
 /// The message `parameterValues`, for these names, or for all parameters if there are none.
-pub fn parameter_values(frame: Option<&Frame>, names: &[String], id: Option<&str>) -> String {
+pub fn parameter_values(snapshot: Option<&Snapshot>, names: &[String], id: Option<&str>) -> String {
     let wanted = |name: &&&str| names.is_empty() || names.iter().any(|other| other == **name);
     let value = |name: &&str| {
-        let value = parameter(frame?, name)?;
+        let value = parameter(snapshot?, name)?;
         Some(json!({"name": name, "type": "float64_array", "value": value}))
     };
     let parameters: Vec<Value> = PARAMETERS.iter().filter(wanted).filter_map(value).collect();

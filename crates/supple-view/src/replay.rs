@@ -1,14 +1,14 @@
-//! A log as pictures, evenly spaced, for the page's time slider.
+//! A log as snapshots, evenly spaced, for the page's time slider.
 
 use crate::error::ViewError;
-use crate::frame::{Beside, Frame, Reducer};
+use crate::snapshot::{CycleExtras, Snapshot, SnapshotBuilder};
 use std::path::Path;
 use supple_log::{CycleTiming, LogError, Reader, Timed};
 use supple_model::{Description, with_dof};
 
-/// Most pictures of a log; a longer one has fewer pictures a second.
-const MAX_FRAMES: usize = 4000;
-/// Least time between two pictures \[s\].
+/// Most snapshots of a log; a longer one has fewer snapshots a second.
+const MAX_SNAPSHOTS: usize = 4000;
+/// Least time between two snapshots \[s\].
 const MIN_INTERVAL_S: f64 = 0.02;
 
 /// A log to show.
@@ -18,9 +18,9 @@ pub struct Replay {
     pub description: Description,
     /// Name of the experiment.
     pub experiment: String,
-    /// The pictures; their time is counted from the first cycle.
-    pub frames: Vec<Frame>,
-    /// Time between two pictures \[s\].
+    /// The snapshots; their time is counted from the first cycle.
+    pub snapshots: Vec<Snapshot>,
+    /// Time between two snapshots \[s\].
     pub interval_s: f64,
     /// The log stops before its end.
     pub incomplete: bool,
@@ -33,22 +33,22 @@ pub struct Replay {
 pub fn read(file: &Path) -> Result<Replay, ViewError> {
     let reader = Reader::open(file)?;
     let description = reader.description()?;
-    let read = with_dof!(description.dof(), N => frames::<N>(&reader))?;
-    let (frames, interval_s, incomplete) = read?;
+    let read = with_dof!(description.dof(), N => snapshots::<N>(&reader))?;
+    let (snapshots, interval_s, incomplete) = read?;
     Ok(Replay {
         experiment: reader.about().experiment.clone(),
         description,
-        frames,
+        snapshots,
         interval_s,
         incomplete,
     })
 }
 
-fn frames<const N: usize>(reader: &Reader) -> Result<(Vec<Frame>, f64, bool), LogError> {
+fn snapshots<const N: usize>(reader: &Reader) -> Result<(Vec<Snapshot>, f64, bool), LogError> {
     let mut timings = reader.timings()?;
     let mut timing: Option<Timed<CycleTiming>> = None;
-    let (mut frames, mut interval_s) = (Vec::new(), MIN_INTERVAL_S);
-    let mut reducer = Reducer::<N>::default();
+    let (mut snapshots, mut interval_s) = (Vec::new(), MIN_INTERVAL_S);
+    let mut builder = SnapshotBuilder::<N>::default();
     let (mut start_ns, mut next_s) = (None, 0.0);
     let mut incomplete = false;
     for record in reader.records::<N>()? {
@@ -70,33 +70,33 @@ fn frames<const N: usize>(reader: &Reader) -> Result<(Vec<Frame>, f64, bool), Lo
         let time_s = record.time_ns.saturating_sub(start_ns) as f64 / 1e9;
         let this = timing.as_ref().filter(|t| t.time_ns == record.time_ns);
         let microseconds = |ns: u64| ns as f64 / 1e3;
-        let beside = Beside {
+        let extras = CycleExtras {
             time_s,
             timing_us: this.map(|t| {
                 [t.value.period_ns, t.value.latency_ns, t.value.step_ns].map(microseconds)
             }),
-            ..Beside::default()
+            ..CycleExtras::default()
         };
-        reducer.add(&record.value, beside);
+        builder.add(&record.value, extras);
         if time_s >= next_s {
-            frames.extend(reducer.take());
+            snapshots.extend(builder.take());
             next_s = time_s + interval_s - 1e-6;
-            if frames.len() > MAX_FRAMES {
-                frames = halved(frames);
+            if snapshots.len() > MAX_SNAPSHOTS {
+                snapshots = halved(snapshots);
                 interval_s *= 2.0;
             }
         }
     }
-    frames.extend(reducer.take());
-    Ok((frames, interval_s, incomplete))
+    snapshots.extend(builder.take());
+    Ok((snapshots, interval_s, incomplete))
 }
 
-/// Every second picture, with the peaks of the one before it.
-fn halved(frames: Vec<Frame>) -> Vec<Frame> {
-    let mut frames = frames.into_iter();
+/// Every second snapshot, with the peaks of the one before it.
+fn halved(snapshots: Vec<Snapshot>) -> Vec<Snapshot> {
+    let mut snapshots = snapshots.into_iter();
     let mut kept = Vec::new();
-    while let Some(first) = frames.next() {
-        let Some(mut second) = frames.next() else {
+    while let Some(first) = snapshots.next() {
+        let Some(mut second) = snapshots.next() else {
             kept.push(first);
             break;
         };

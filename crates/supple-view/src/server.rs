@@ -29,7 +29,7 @@ pub struct Shown {
     pub name: String,
     /// The page's description of it, JSON.
     pub info: Vec<u8>,
-    /// Pictures of a log, JSON; `None` for a running system.
+    /// Snapshots of a log, JSON; `None` for a running system.
     pub log: Option<Vec<u8>>,
 }
 

@@ -106,13 +106,13 @@ impl Updates {
         if !self.subscribed || self.sent.is_some_and(waits) {
             return None;
         }
-        let frame = hub.latest()?;
-        let (stiffness, damping) = (frame.stiffness_n_per_m, frame.damping_n_s_per_m);
+        let snapshot = hub.latest()?;
+        let (stiffness, damping) = (snapshot.stiffness_n_per_m, snapshot.damping_n_s_per_m);
         let changed = self
             .sent
             .is_none_or(|(k, b, _)| (k, b) != (stiffness, damping));
         self.sent = Some((stiffness, damping, Instant::now()));
-        changed.then(|| parameter_values(Some(&frame), &[], None))
+        changed.then(|| parameter_values(Some(&snapshot), &[], None))
     }
 }
 
@@ -153,9 +153,9 @@ fn text_message(
             parameter_names,
             id,
         } => {
-            let frame = hub.latest();
+            let snapshot = hub.latest();
             vec![parameter_values(
-                frame.as_ref(),
+                snapshot.as_ref(),
                 &parameter_names,
                 id.as_deref(),
             )]
@@ -232,8 +232,8 @@ fn replies(hub: &Hub, reply_to: ReplyTo, answer: Answer) -> Vec<Message> {
 
 /// The parameters as they are now, behind the reason for which they could not be set.
 fn parameter_reply(hub: &Hub, id: Option<&str>, refused: Option<&str>) -> Vec<String> {
-    let frame = hub.latest();
-    let now = parameter_values(frame.as_ref(), &[], id);
+    let snapshot = hub.latest();
+    let now = parameter_values(snapshot.as_ref(), &[], id);
     let refused = refused.map(|reason| status(2, reason));
     refused.into_iter().chain([now]).collect()
 }

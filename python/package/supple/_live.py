@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -473,21 +473,76 @@ class System:
         stiffness_n_per_m: ArrayLike | None = None,
         damping_n_s_per_m: ArrayLike | None = None,
         *,
+        axes: Literal["base", "tip"] = "base",
         ramp_s: float = 0.5,
     ) -> Answer:
-        """Change stiffness and damping of the tip along a ramp.
+        """Change stiffness and damping of the tip's position along a ramp.
 
         Parameters
         ----------
-        stiffness_n_per_m, damping_n_s_per_m : array_like, () or (3,), optional
-            For all axes, or for x, y, z (N/m, N s/m). Default: as they are.
+        stiffness_n_per_m, damping_n_s_per_m : array_like, () or (3,) or (3, 3), optional
+            For all axes, for x, y, z, or as symmetric positive semi-definite matrices (N/m, N s/m). Matrices need
+            six active joints, come in pairs and act while the pose is tracked. Default: as they are.
+        axes : {"base", "tip"}
+            Axes of matrices; ``"tip"`` turns with the reference of the tip's orientation.
         ramp_s : float
             Time of the ramp (s).
         """
+        if axes != "base" or np.ndim(stiffness_n_per_m) == 2 or np.ndim(damping_n_s_per_m) == 2:
+            stiffness = _symmetric("stiffness_n_per_m", stiffness_n_per_m)
+            damping = _symmetric("damping_n_s_per_m", damping_n_s_per_m)
+            return self.request("gain_matrices", [0.0, *stiffness, *damping, _axes_code(axes), ramp_s])
         now = self.state
         stiffness = _axes("stiffness_n_per_m", stiffness_n_per_m, now.stiffness_n_per_m)
         damping = _axes("damping_n_s_per_m", damping_n_s_per_m, now.damping_n_s_per_m)
         return self.request("gains", [*stiffness, *damping, ramp_s])
+
+    def rotational_gains(
+        self,
+        stiffness_nm_per_rad: ArrayLike,
+        damping_nm_s_per_rad: ArrayLike,
+        *,
+        axes: Literal["base", "tip"] = "base",
+        ramp_s: float = 0.5,
+    ) -> Answer:
+        """Change stiffness and damping of the tip's orientation along a ramp.
+
+        Parameters
+        ----------
+        stiffness_nm_per_rad, damping_nm_s_per_rad : array_like, () or (3,) or (3, 3)
+            About all axes, about x, y, z, or as symmetric positive semi-definite matrices (N m/rad, N m s/rad).
+        axes : {"base", "tip"}
+            Axes about which they act; ``"tip"`` turns with the reference of the tip's orientation.
+        ramp_s : float
+            Time of the ramp (s).
+        """
+        stiffness = _symmetric("stiffness_nm_per_rad", stiffness_nm_per_rad)
+        damping = _symmetric("damping_nm_s_per_rad", damping_nm_s_per_rad)
+        return self.request("gain_matrices", [1.0, *stiffness, *damping, _axes_code(axes), ramp_s])
+
+    def turn(self, axis: ArrayLike, angle_rad: float, duration_s: float, *, wait: bool = True) -> Answer:
+        """Turn the tip about an axis while its position stays, and hold that pose. Needs six active joints.
+
+        Parameters
+        ----------
+        axis : array_like, (3,)
+            Axis of the rotation, base axes; its length does not matter.
+        angle_rad : float
+            Angle (rad).
+        duration_s : float
+            Duration of the rotation (s).
+        wait : bool
+            Return when it is done.
+        """
+        direction = _axes("axis", axis, None)
+        length = float(np.linalg.norm(direction))
+        if not length > 0.0:
+            raise ValueError(f"axis: expected a direction, got {direction.tolist()}")
+        values = [*(direction / length), angle_rad, duration_s, *self._reference_m()]
+        answer = self.request("track_pose", values, trajectory="hold")
+        if wait:
+            self.wait(duration_s)
+        return answer
 
     def joint_gains(
         self, stiffness_nm_per_rad: ArrayLike, damping_nm_s_per_rad: ArrayLike, *, ramp_s: float = 0.5
@@ -512,9 +567,7 @@ class System:
 
     def hold(self) -> Answer:
         """Hold the tip where its reference is, with the stiffness in force."""
-        now = self.state
-        here = now.tip_position_m if now.reference_position_m is None else now.reference_position_m
-        return self.request("track", here, trajectory="hold")
+        return self.request("track", self._reference_m(), trajectory="hold")
 
     def line(self, to_m: ArrayLike, duration_s: float, *, wait: bool = True) -> Answer:
         """Move the tip on a straight line from its reference, or from where it is.
@@ -528,9 +581,7 @@ class System:
         wait : bool
             Return when it is done.
         """
-        now = self.state
-        start = now.tip_position_m if now.reference_position_m is None else now.reference_position_m
-        values = [*start, *_axes("to_m", to_m, None), duration_s]
+        values = [*self._reference_m(), *_axes("to_m", to_m, None), duration_s]
         answer = self.request("track", values, trajectory="line")
         if wait:
             self.wait(duration_s)
@@ -580,6 +631,11 @@ class System:
         native = self._native
         while native.cycle() < cycle and native.wait(native.received(), 0.2):
             pass
+
+    def _reference_m(self) -> Array:
+        """Where the tip's reference is, or the tip without one (m)."""
+        now = self.state
+        return now.tip_position_m if now.reference_position_m is None else now.reference_position_m
 
     def _joints(self, name: str, given: ArrayLike) -> Array:
         array = np.asarray(given, dtype=np.float64)
@@ -734,6 +790,28 @@ def _axes(name: str, given: ArrayLike | None, otherwise: Array | None) -> Array:
         wanted = "a number or shape (3,)" if otherwise is not None else "shape (3,)"
         raise ValueError(f"{name}: expected {wanted}, for x, y, z of the base axes, got {array.shape}")
     return array
+
+
+def _symmetric(name: str, given: ArrayLike | None) -> list[float]:
+    """Entries xx, yy, zz, yz, zx, xy of a symmetric matrix, or of a diagonal one from a number or three."""
+    array = np.asarray(np.nan if given is None else given, dtype=np.float64)
+    if array.ndim == 0:
+        array = np.full(3, array)
+    if array.shape == (3,):
+        array = np.diag(array)
+    if given is None or array.shape != (3, 3):
+        found = "nothing" if given is None else str(array.shape)
+        raise ValueError(f"{name}: expected a number, shape (3,) or shape (3, 3), got {found}")
+    if not np.array_equal(array, array.T):
+        raise ValueError(f"{name}: expected a symmetric matrix, got {array.tolist()}")
+    return [float(array[i, j]) for i, j in ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))]
+
+
+def _axes_code(axes: str) -> float:
+    names = ("base", "tip")
+    if axes not in names:
+        raise ValueError(f"axes: expected 'base' or 'tip', got {axes!r}")
+    return float(names.index(axes))
 
 
 def _states(block: dict[str, Any], period_s: float) -> States:

@@ -87,7 +87,7 @@ impl<const N: usize> InProcessArm<N> {
         let without_brakes = self
             .model
             .as_ref()
-            .is_some_and(|model| model.bus().is_some());
+            .is_some_and(Description::falls_without_torque);
         let fault = if without_brakes {
             let period_s = self.rig()?.controller().config().period_s;
             self.hold(Request::GravityHold, period_s)?;

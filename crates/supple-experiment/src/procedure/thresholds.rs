@@ -37,7 +37,7 @@ pub fn minimum_thresholds<const N: usize>(
     model: &Description,
     before_first_fit: bool,
 ) -> Result<MinimumThresholds, ProcedureError> {
-    let has_no_brakes = model.bus().is_some();
+    let has_no_brakes = model.falls_without_torque();
     let minimum = MinimumThresholds {
         move_share: 1.0,
         joint_torque_nm: None,

@@ -212,7 +212,7 @@ fn parse(text: &str, file: &str) -> Result<Points, PointsError> {
     }
     let time = find("time_s");
     let joints: Vec<usize> = (1..).map_while(|i| find(&format!("q{i}_rad"))).collect();
-    let mut shown = RecordedMotion::default();
+    let mut recorded = RecordedMotion::default();
     for (index, line) in lines {
         let values: Vec<&str> = line.split(',').map(str::trim).collect();
         let number = |column: usize| {
@@ -226,9 +226,12 @@ fn parse(text: &str, file: &str) -> Result<Points, PointsError> {
             })
         };
         let tip_m = Vector3::new(number(axes[0])?, number(axes[1])?, number(axes[2])?);
-        let value_s = time.map_or(Ok(shown.time_s.len() as f64), number)?;
-        let first_s = shown.time_s.first().copied().unwrap_or(value_s);
-        let increases = shown.time_s.last().is_none_or(|last_s| value_s > *last_s);
+        let value_s = time.map_or(Ok(recorded.time_s.len() as f64), number)?;
+        let first_s = recorded.time_s.first().copied().unwrap_or(value_s);
+        let increases = recorded
+            .time_s
+            .last()
+            .is_none_or(|last_s| value_s > *last_s);
         if time.is_some() && !(increases && value_s - first_s <= MAX_S) {
             return Err(PointsError::Time {
                 file: file.to_owned(),
@@ -237,12 +240,12 @@ fn parse(text: &str, file: &str) -> Result<Points, PointsError> {
             });
         }
         let angles: Result<Vec<f64>, PointsError> = joints.iter().map(|c| number(*c)).collect();
-        shown.push(value_s, tip_m, &angles?);
+        recorded.push(value_s, tip_m, &angles?);
     }
     if joints.is_empty() {
-        shown.joints_rad.clear();
+        recorded.joints_rad.clear();
     }
-    let (found, needed) = (shown.time_s.len(), if time.is_some() { 10 } else { 2 });
+    let (found, needed) = (recorded.time_s.len(), if time.is_some() { 10 } else { 2 });
     if found < needed {
         return Err(PointsError::TooShort {
             file: file.to_owned(),
@@ -251,8 +254,8 @@ fn parse(text: &str, file: &str) -> Result<Points, PointsError> {
         });
     }
     Ok(match time {
-        Some(_) => Points::RecordedMotion(shown),
-        None => Points::Waypoints(shown.tip_m),
+        Some(_) => Points::RecordedMotion(recorded),
+        None => Points::Waypoints(recorded.tip_m),
     })
 }
 
@@ -260,37 +263,37 @@ fn parse(text: &str, file: &str) -> Result<Points, PointsError> {
 mod tests {
     use super::*;
 
-    fn shown() -> RecordedMotion {
-        let mut shown = RecordedMotion::default();
+    fn recorded() -> RecordedMotion {
+        let mut recorded = RecordedMotion::default();
         // A second of rest, two seconds of motion, two of rest.
         for k in 0..500 {
             let time_s = 0.01 * f64::from(k);
             let way_m = 0.1 * (time_s - 1.0).clamp(0.0, 2.0);
-            shown.push(7.0 + time_s, Vector3::new(0.5, way_m, 0.25), &[way_m, -1.0]);
+            recorded.push(7.0 + time_s, Vector3::new(0.5, way_m, 0.25), &[way_m, -1.0]);
         }
-        shown
+        recorded
     }
 
     #[test]
     fn a_written_motion_is_read_as_it_was() {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("shown.csv");
-        let shown = shown();
-        shown.write(&file).expect("written");
+        let recorded = recorded();
+        recorded.write(&file).expect("written");
         let Ok(Points::RecordedMotion(read)) = read_points(&file) else {
             panic!("not a motion");
         };
         assert_eq!(read.time_s.len(), 500);
         for i in 0..500 {
-            assert!((read.time_s[i] - shown.time_s[i]).abs() < 1e-4);
-            assert!((read.tip_m[i] - shown.tip_m[i]).norm() < 1e-5);
-            assert!((read.joints_rad[i][0] - shown.joints_rad[i][0]).abs() < 1e-6);
+            assert!((read.time_s[i] - recorded.time_s[i]).abs() < 1e-4);
+            assert!((read.tip_m[i] - recorded.tip_m[i]).norm() < 1e-5);
+            assert!((read.joints_rad[i][0] - recorded.joints_rad[i][0]).abs() < 1e-6);
         }
     }
 
     #[test]
     fn rest_before_and_after_is_left_out() {
-        let trimmed = shown().trimmed().expect("it moves");
+        let trimmed = recorded().trimmed().expect("it moves");
         assert_eq!(trimmed.time_s[0], 0.0);
         assert!(
             (2.0..3.0).contains(&trimmed.duration_s()),

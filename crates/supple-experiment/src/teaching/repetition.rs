@@ -68,22 +68,22 @@ impl<const N: usize> Repetition<N> {
     /// [`RepetitionError`]: a motion out of reach, or one that is too fast or needs too much torque at every speed.
     pub fn plan(
         controller: &Controller<N>,
-        shown: &RecordedMotion,
+        recorded: &RecordedMotion,
         speed: f64,
     ) -> Result<Repetition<N>, RepetitionError> {
         let config = controller.config();
-        let (Some(begin_s), Some(tip_m)) = (shown.time_s.first(), shown.tip_m.first()) else {
+        let (Some(begin_s), Some(tip_m)) = (recorded.time_s.first(), recorded.tip_m.first()) else {
             return Err(RepetitionError::NoMotion);
         };
         // The smoothing window extends beyond both ends of the motion.
-        let length_s = shown.duration_s() + 2.0 * HALF_S;
+        let length_s = recorded.duration_s() + 2.0 * HALF_S;
         let intervals = (length_s / SPACING_S).ceil() as usize;
-        let at = |k: usize| reference_at(shown, begin_s - HALF_S + SPACING_S * k as f64, HALF_S);
+        let at = |k: usize| reference_at(recorded, begin_s - HALF_S + SPACING_S * k as f64, HALF_S);
         let mut points: Vec<Reference> = (0..=intervals).map(at).collect();
         for end in [0, intervals] {
             points[end] = Reference::at_rest(points[end].position);
         }
-        let start_rad = match shown.joints_rad.first() {
+        let start_rad = match recorded.joints_rad.first() {
             Some(joints) if joints.len() == N => Vector::from_column_slice(joints),
             _ => start_pose(config, "motion", &Trajectory::Hold(*tip_m), 0.0)
                 .map_err(|error| RepetitionError::Start(error.to_string()))?,

@@ -7,8 +7,8 @@ use supple_core::math::Vector3;
 
 /// The motion at a time \[s\], from the samples within `half_s` before and after; it rests before its first and after its
 /// last sample.
-pub fn reference_at(shown: &RecordedMotion, time_s: f64, half_s: f64) -> Reference {
-    let (Some(first_s), Some(last_s)) = (shown.time_s.first(), shown.time_s.last()) else {
+pub fn reference_at(recorded: &RecordedMotion, time_s: f64, half_s: f64) -> Reference {
+    let (Some(first_s), Some(last_s)) = (recorded.time_s.first(), recorded.time_s.last()) else {
         return Reference::at_rest(Vector3::zeros());
     };
     // Samples on an even grid: those of the file, and those of the rest around them.
@@ -25,7 +25,7 @@ pub fn reference_at(shown: &RecordedMotion, time_s: f64, half_s: f64) -> Referen
     };
     for k in -SAMPLES..=SAMPLES {
         let at_s = time_s + half_s * f64::from(k) / f64::from(SAMPLES);
-        add(at_s, &shown.tip_at(at_s.clamp(*first_s, *last_s)));
+        add(at_s, &recorded.tip_at(at_s.clamp(*first_s, *last_s)));
     }
     // Regular: the times of the grid differ.
     let inverse = normal.try_inverse().unwrap_or_else(Matrix3::zeros);
@@ -44,12 +44,12 @@ mod tests {
 
     #[test]
     fn a_parabola_is_met_exactly_and_the_ends_rest() {
-        let mut shown = RecordedMotion::default();
+        let mut recorded = RecordedMotion::default();
         for k in 0..=400 {
             let t = 0.005 * f64::from(k);
-            shown.push(t, Vector3::new(0.1 * t * t, 0.2 * t, 0.3), &[]);
+            recorded.push(t, Vector3::new(0.1 * t * t, 0.2 * t, 0.3), &[]);
         }
-        let at = reference_at(&shown, 1.0, 0.1);
+        let at = reference_at(&recorded, 1.0, 0.1);
         assert!(
             (at.position - Vector3::new(0.1, 0.2, 0.3)).norm() < 1e-6,
             "{at:?}"
@@ -62,8 +62,8 @@ mod tests {
             (at.acceleration - Vector3::new(0.2, 0.0, 0.0)).norm() < 1e-2,
             "{at:?}"
         );
-        for (time_s, tip_m) in [(-0.2, shown.tip_m[0]), (2.2, shown.tip_m[400])] {
-            let at = reference_at(&shown, time_s, 0.1);
+        for (time_s, tip_m) in [(-0.2, recorded.tip_m[0]), (2.2, recorded.tip_m[400])] {
+            let at = reference_at(&recorded, time_s, 0.1);
             assert!((at.position - tip_m).norm() < 1e-9 && at.velocity.norm() < 1e-9);
         }
     }

@@ -214,7 +214,7 @@ fn sampled(path: &Path, times_s: &[f64]) -> RecordedMotion {
     let duration_s = times_s[times_s.len() - 1] + SMOOTHING_S;
     let samples = (duration_s / SAMPLE_S).ceil() as usize;
     let parts = (SMOOTHING_S / SAMPLE_S).round() as usize * 4;
-    let mut shown = RecordedMotion::default();
+    let mut recorded = RecordedMotion::default();
     for k in 0..=samples {
         let time_s = SAMPLE_S * k as f64;
         let mean_m = (0..parts)
@@ -225,10 +225,10 @@ fn sampled(path: &Path, times_s: &[f64]) -> RecordedMotion {
         let before = (at as usize).min(path.points_m.len() - 2);
         let share = at - before as f64;
         let tip_m = path.points_m[before] * (1.0 - share) + path.points_m[before + 1] * share;
-        shown.time_s.push(time_s);
-        shown.tip_m.push(tip_m);
+        recorded.time_s.push(time_s);
+        recorded.tip_m.push(tip_m);
     }
-    shown
+    recorded
 }
 
 #[cfg(test)]
@@ -236,12 +236,16 @@ mod tests {
     use super::*;
 
     /// Peak speed and acceleration, from differences over 40 ms.
-    fn peaks(shown: &RecordedMotion) -> (f64, f64) {
+    fn peaks(recorded: &RecordedMotion) -> (f64, f64) {
         let (mut speed, mut acceleration) = (0.0_f64, 0.0_f64);
         let d = 8;
-        for i in d..shown.time_s.len() - d {
+        for i in d..recorded.time_s.len() - d {
             let dt = SAMPLE_S * d as f64;
-            let (p, q, r) = (shown.tip_m[i - d], shown.tip_m[i], shown.tip_m[i + d]);
+            let (p, q, r) = (
+                recorded.tip_m[i - d],
+                recorded.tip_m[i],
+                recorded.tip_m[i + d],
+            );
             speed = speed.max((r - p).norm() / (2.0 * dt));
             acceleration = acceleration.max((r - q * 2.0 + p).norm() / (dt * dt));
         }
@@ -251,18 +255,18 @@ mod tests {
     #[test]
     fn a_straight_line_takes_the_time_of_the_trapezoid() {
         let line = [Vector3::zeros(), Vector3::new(1.0, 0.0, 0.0)];
-        let shown = time_waypoints(&line, 0.5, 1.0).expect("a path");
+        let recorded = time_waypoints(&line, 0.5, 1.0).expect("a path");
         // 1 m at 0.5 m/s and 1 m/s^2: 2 s at full speed plus half a second, and what the smoothing adds.
         assert!(
-            (shown.duration_s() - (2.5 + SMOOTHING_S)).abs() < 0.02,
+            (recorded.duration_s() - (2.5 + SMOOTHING_S)).abs() < 0.02,
             "{}",
-            shown.duration_s()
+            recorded.duration_s()
         );
-        let (speed, acceleration) = peaks(&shown);
+        let (speed, acceleration) = peaks(&recorded);
         assert!((0.495..=0.5 + 1e-6).contains(&speed), "{speed}");
         assert!((0.9..=1.02).contains(&acceleration), "{acceleration}");
-        assert_eq!(shown.tip_m[0], line[0]);
-        assert!((shown.tip_m[shown.tip_m.len() - 1] - line[1]).norm() < 1e-9);
+        assert_eq!(recorded.tip_m[0], line[0]);
+        assert!((recorded.tip_m[recorded.tip_m.len() - 1] - line[1]).norm() < 1e-9);
     }
 
     #[test]
@@ -274,15 +278,15 @@ mod tests {
                 Vector3::new(radius_m * angle.cos(), radius_m * angle.sin(), 0.0)
             })
             .collect();
-        let shown = time_waypoints(&points, 10.0, 0.9).expect("a path");
-        let (speed, acceleration) = peaks(&shown);
+        let recorded = time_waypoints(&points, 10.0, 0.9).expect("a path");
+        let (speed, acceleration) = peaks(&recorded);
         // v^2 / r = a.
         assert!((speed / 0.3 - 1.0).abs() < 0.03, "{speed}");
         assert!((0.85..=0.95).contains(&acceleration), "{acceleration}");
         let way_m = core::f64::consts::TAU * radius_m;
         let at_full_speed_s = way_m / 0.3;
-        assert!(shown.duration_s() > at_full_speed_s);
-        assert!(shown.duration_s() < at_full_speed_s + 2.0 * 0.3 / 0.9 + SMOOTHING_S);
+        assert!(recorded.duration_s() > at_full_speed_s);
+        assert!(recorded.duration_s() < at_full_speed_s + 2.0 * 0.3 / 0.9 + SMOOTHING_S);
     }
 
     #[test]
@@ -296,12 +300,12 @@ mod tests {
         ]
         .map(Vector3::from)
         .to_vec();
-        let shown = time_waypoints(&points, 0.4, 1.5).expect("a path");
+        let recorded = time_waypoints(&points, 0.4, 1.5).expect("a path");
         for point in &points {
-            let distance = shown.tip_m.iter().map(|tip| (tip - point).norm());
+            let distance = recorded.tip_m.iter().map(|tip| (tip - point).norm());
             assert!(distance.fold(f64::MAX, f64::min) < 2e-3, "{point}");
         }
-        let (speed, acceleration) = peaks(&shown);
+        let (speed, acceleration) = peaks(&recorded);
         assert!(
             speed <= 0.4 + 1e-6 && acceleration <= 1.5 * 1.1,
             "{speed} {acceleration}"

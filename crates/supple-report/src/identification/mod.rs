@@ -3,8 +3,8 @@
 
 mod breakaway;
 mod calibrate;
-mod excite;
-mod follow;
+mod excitation_design;
+mod excitation_run;
 mod identify;
 mod joints;
 mod learn;
@@ -21,8 +21,8 @@ use supple_cli::exit::Failure;
 pub fn run(command: &IdentificationCommand) -> Result<(), Failure> {
     match command {
         IdentificationCommand::Identify(args) => identify::run(args),
-        IdentificationCommand::Excite(ExciteCommand::Design(args)) => excite::run(args),
-        IdentificationCommand::Excite(ExciteCommand::Run(args)) => follow::run(args),
+        IdentificationCommand::Excite(ExciteCommand::Design(args)) => excitation_design::run(args),
+        IdentificationCommand::Excite(ExciteCommand::Run(args)) => excitation_run::run(args),
         IdentificationCommand::Breakaway(args) => breakaway::run(args),
         IdentificationCommand::Calibrate(args) => calibrate::run(args),
         IdentificationCommand::CalibratePaper(args) => paper::run(args),

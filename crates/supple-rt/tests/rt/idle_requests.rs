@@ -252,14 +252,15 @@ fn a_move_that_waits_is_checked_from_the_pose_in_which_it_begins() {
     bench.position_rad = target_rad.into();
     let mut operator = OperatorClient::new(&bench.domain).expect("an operator");
     bench.hold(&mut operator);
+    // The arm is moved by hand meanwhile, without torque. (What is requested before that is refused for it.)
+    bench.drives = Drives::Idle;
+    bench.run(10);
     let at_cycle = bench.cycle + 600;
     operator
         .send::<4>(&request, Some(at_cycle))
         .expect("sent")
         .expect("a controller");
     bench.run(100);
-    // The arm is moved by hand meanwhile, without torque.
-    bench.drives = Drives::Idle;
     for k in 1..=200 {
         let share = f64::from(k) / 200.0;
         bench.position_rad = (target_rad + (home - target_rad) * share).into();

@@ -1,4 +1,4 @@
-//! A running system: pictures, the channels of a log, commands, and viewers that do not read.
+//! A running system: snapshots, the channels of a log, commands, and viewers that do not read.
 
 use crate::client::{Client, get_url};
 use crate::controller::System;
@@ -17,8 +17,8 @@ pub fn subscribe(client: &mut Client, advertised: &Value, id: u32, topic: &str) 
     client.send(&json!({"op": "subscribe", "subscriptions": [{"id": id, "channelId": channel}]}));
 }
 
-/// The next picture.
-fn picture(client: &mut Client, system: &System) -> Value {
+/// The next snapshot.
+fn snapshot(client: &mut Client, system: &System) -> Value {
     let bytes = client.wait_for_data(&mut || system.step(), 9);
     serde_json::from_slice(&bytes).expect("JSON")
 }
@@ -38,11 +38,11 @@ fn a_viewer_sees_the_arm_move_and_a_new_stiffness_comes_back_from_the_controller
     let mut client = Client::connect(&addresses.foxglove_url, "").expect("accepted");
     let advertised = client.wait_for_op(&mut || system.step(), "advertise");
     subscribe(&mut client, &advertised, 9, "/view");
-    let first = picture(&mut client, &system);
+    let first = snapshot(&mut client, &system);
     assert_eq!(first["mode"], "track");
     assert_eq!(first["stiffness_n_per_m"], json!([5.0, 5.0, 5.0]));
-    let angle = |picture: &Value| picture["joints_rad"][1].as_f64().expect("an angle");
-    assert!(angle(&picture(&mut client, &system)) > angle(&first));
+    let angle = |snapshot: &Value| snapshot["joints_rad"][1].as_f64().expect("an angle");
+    assert!(angle(&snapshot(&mut client, &system)) > angle(&first));
 
     let gains = json!({"request": "gains", "stiffness_n_per_m": [12.0, 12.0, 12.0]});
     let reply = client
@@ -50,9 +50,9 @@ fn a_viewer_sees_the_arm_move_and_a_new_stiffness_comes_back_from_the_controller
         .expect("accepted");
     assert_eq!(reply, json!({"accepted": true, "mode": "track"}));
     for _ in 0..3 {
-        picture(&mut client, &system);
+        snapshot(&mut client, &system);
     }
-    let after = picture(&mut client, &system);
+    let after = snapshot(&mut client, &system);
     assert_eq!(after["stiffness_n_per_m"], json!([12.0, 12.0, 12.0]));
     // What was not asked for stays.
     assert_eq!(after["damping_n_s_per_m"], json!([8.0, 8.0, 8.0]));
@@ -125,7 +125,7 @@ fn a_page_that_only_shows_refuses_commands() {
     let mut client = Client::connect(&addresses.foxglove_url, "").expect("accepted");
     let advertised = client.wait_for_op(&mut || system.step(), "advertise");
     subscribe(&mut client, &advertised, 9, "/view");
-    assert_eq!(picture(&mut client, &system)["mode"], "track");
+    assert_eq!(snapshot(&mut client, &system)["mode"], "track");
     for command in [
         json!({"request": "idle"}),
         json!({"request": "gains", "stiffness_n_per_m": [1, 1, 1]}),

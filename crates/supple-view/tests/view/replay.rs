@@ -57,17 +57,20 @@ fn a_log_is_shown_with_its_peaks() {
         serde_json::from_str(&body).expect("JSON")
     };
     assert_eq!(json("info.json")["log"]["experiment"], "a test");
-    let frames = json("log.json");
-    let frames = frames.as_array().expect("pictures");
-    let time = |frame: &Value| frame["time_s"].as_f64().expect("a time");
-    assert!(time(&frames[0]) < 1e-9);
-    assert!((time(&frames[frames.len() - 1]) - 2.999).abs() < 1e-6);
-    let gap = frames
+    let snapshots = json("log.json");
+    let snapshots = snapshots.as_array().expect("snapshots");
+    let time = |snapshot: &Value| snapshot["time_s"].as_f64().expect("a time");
+    assert!(time(&snapshots[0]) < 1e-9);
+    assert!((time(&snapshots[snapshots.len() - 1]) - 2.999).abs() < 1e-6);
+    let gap = snapshots
         .windows(2)
         .map(|pair| time(&pair[1]) - time(&pair[0]));
     assert!(gap.fold(0.0, f64::max) < 0.0201);
-    let hit: Vec<_> = frames.iter().filter(|f| f["force_n"][2] == 40.0).collect();
-    assert_eq!(hit.len(), 1, "the impact is in one picture");
+    let hit: Vec<_> = snapshots
+        .iter()
+        .filter(|f| f["force_n"][2] == 40.0)
+        .collect();
+    assert_eq!(hit.len(), 1, "the impact is in one snapshot");
     let impact_s = 1e-3 * IMPACT as f64;
     assert!((0.0..0.0201).contains(&(time(hit[0]) - impact_s)));
     stop.request_shutdown();

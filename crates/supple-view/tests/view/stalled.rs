@@ -9,8 +9,8 @@ use supple_view::Options;
 
 /// Descriptions of the arm that a stalled viewer asks for: some 5 MB, more than the two buffers of a connection hold.
 const DESCRIPTIONS: usize = 1000;
-/// Pictures that another viewer must get while a connection is stuck.
-const PICTURES: usize = 10;
+/// Snapshots that another viewer must get while a connection is stuck.
+const SNAPSHOTS: usize = 10;
 
 /// What the kernel reports of one end of a connection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,10 +70,10 @@ fn a_viewer_that_never_reads_holds_up_neither_the_controller_nor_the_others() {
             client
         })
         .collect();
-    // Stuck: the kernel holds bytes for the viewer, and from one picture of the other viewer to the next it neither
+    // Stuck: the kernel holds bytes for the viewer, and from one snapshot of the other viewer to the next it neither
     // gets rid of any nor is given more, although there is always more for it.
     let mut last = [None; 3];
-    let mut stuck_pictures = [0; 3];
+    let mut stuck_snapshots = [0; 3];
     let mut dropped = [false; 3];
     while dropped != [true; 3] {
         watching.wait_for_data(&mut step, 9);
@@ -81,14 +81,14 @@ fn a_viewer_that_never_reads_holds_up_neither_the_controller_nor_the_others() {
             let now = server_end(server, client.port());
             let stuck = |end: Sending| end.established && end.unsent_bytes > 0;
             if now.is_some_and(stuck) && now == last[index] {
-                stuck_pictures[index] += 1;
+                stuck_snapshots[index] += 1;
             }
             dropped[index] = !now.is_some_and(|end| end.established);
             last[index] = now;
         }
     }
-    for pictures in stuck_pictures {
-        assert!(pictures >= PICTURES, "{stuck_pictures:?} pictures");
+    for snapshots in stuck_snapshots {
+        assert!(snapshots >= SNAPSHOTS, "{stuck_snapshots:?} snapshots");
     }
     // It goes on when they have been given up.
     watching.wait_for_data(&mut step, 9);

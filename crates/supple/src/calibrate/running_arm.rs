@@ -24,8 +24,8 @@ use supple_realtime::{Stop, pause};
 const MODEL: &str = "controller";
 /// Timeout for a process to join, for a reply and for telemetry.
 const TIMEOUT: Duration = Duration::from_secs(20);
-/// Time for which an arm without a pendant may take to become active \[s\], and the number of attempts: laying down takes
-/// some ten seconds.
+/// Time that an arm without a pendant may take to become active \[s\], and the number of attempts: all of them outlast
+/// the lowering of the arm, which takes some ten seconds.
 const ENABLING_S: f64 = 1.0;
 const ENABLING_ATTEMPTS: usize = 40;
 /// Timeout for an operator to activate a real arm.
@@ -34,8 +34,8 @@ const ACTIVATION_TIMEOUT: Duration = Duration::from_secs(300);
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Maximum number of messages that may be waiting for this reader.
 const MAX_WAITING: u32 = 20_000;
-/// Gravity hold before the drives are activated \[s\].
-const HOLD_S: f64 = 0.2;
+/// Time for which a mode is kept before the next change \[s\].
+const SETTLE_S: f64 = 0.2;
 /// Time in which a stopped arm comes to rest \[s\].
 const REST_S: f64 = 1.5;
 
@@ -49,7 +49,8 @@ pub struct RunningArm<const N: usize> {
     plant: PlantKind,
     /// Whether this program starts the processes; otherwise they run already.
     starts: bool,
-    launched: bool,
+    /// A model was loaded.
+    loaded: bool,
     virtual_time: bool,
     options: PlantOptions,
     folder: PathBuf,
@@ -58,8 +59,8 @@ pub struct RunningArm<const N: usize> {
     stop: Stop,
     recorder: Option<Recorder<N>>,
     last: Option<Telemetry>,
-    /// Cycle since which the arm is held.
-    held_cycle: u64,
+    /// Cycle of the last gravity hold that this program requested.
+    gravity_hold_cycle: u64,
 }
 
 impl<const N: usize> RunningArm<N> {
@@ -84,7 +85,7 @@ impl<const N: usize> RunningArm<N> {
             prefix: domain.prefix().to_owned(),
             plant: args.plant,
             starts,
-            launched: false,
+            loaded: false,
             virtual_time: args.virtual_time,
             options: args.plant_options.options()?,
             folder: out.join(MODEL),
@@ -93,11 +94,12 @@ impl<const N: usize> RunningArm<N> {
             stop,
             recorder: None,
             last: None,
-            held_cycle: 0,
+            gravity_hold_cycle: 0,
         })
     }
 
-    /// Ends the processes in order: the controller sets the drives to idle first.
+    /// Ends the processes in order: the controller sets the drives to idle first. Of processes that run already none is
+    /// ended: gravity hold is requested.
     ///
     /// # Errors
     /// A process that cannot be waited for; a log that cannot be completed.
@@ -109,7 +111,7 @@ impl<const N: usize> RunningArm<N> {
             .last
             .as_ref()
             .is_some_and(|last| last.record().mode() == Some(Mode::Idle));
-        if !self.starts && self.launched && !idle {
+        if !self.starts && self.loaded && !idle {
             // Nobody ends these processes: what was requested must not go on. The controller may have gone.
             let _ = self.session.begin_request(&Request::GravityHold, None);
         }
@@ -183,19 +185,19 @@ impl<const N: usize> RunningArm<N> {
         }
     }
 
-    /// Waits until a request is carried out, while telemetry is read into `read`: in virtual time the controller waits
-    /// for its readers.
-    fn carried_out(
+    /// Waits for the reply to a request, while telemetry is read into `unprocessed`: in virtual time the controller blocks on a
+    /// full queue of telemetry.
+    fn wait_for_reply(
         &mut self,
         sequence: u64,
-        read: &mut VecDeque<Telemetry>,
+        unprocessed: &mut VecDeque<Telemetry>,
     ) -> Result<OperatorReply, Failure> {
         let start = Instant::now();
         loop {
             if let Some(reply) = self.session.reply_to(sequence)? {
                 return Ok(reply);
             }
-            read.extend(self.poll()?);
+            unprocessed.extend(self.poll()?);
             if start.elapsed() > TIMEOUT {
                 return Err(self.not_running());
             }
@@ -212,27 +214,28 @@ impl<const N: usize> RunningArm<N> {
         at_cycle: Option<u64>,
     ) -> Result<OperatorReply, Failure> {
         let sequence = self.begin(request, at_cycle)?;
-        self.carried_out(sequence, &mut VecDeque::new())
+        self.wait_for_reply(sequence, &mut VecDeque::new())
     }
 
-    /// Requests gravity hold, which is refused if somebody requested idle in the cycle `unless_idle_since` or after it.
-    fn hold(&mut self, unless_idle_since: Option<u64>) -> Result<(), Failure> {
+    /// Requests gravity hold. It is dated to the cycle `unless_idle_since`, if given: the controller refuses it if somebody
+    /// requested idle in that cycle or after it.
+    fn request_gravity_hold(&mut self, unless_idle_since: Option<u64>) -> Result<(), Failure> {
         let reply = self.request_at(&Request::GravityHold, unless_idle_since)?;
-        self.held_cycle = reply.cycle;
+        self.gravity_hold_cycle = reply.cycle;
         Ok(())
     }
 
     /// As [`RunningArm::wait_for`], and fails if somebody requests another mode.
-    fn wait_while_held(
+    fn wait_in_gravity_hold(
         &mut self,
         within: Duration,
         mut condition: impl FnMut(&Telemetry) -> bool,
     ) -> Result<bool, Failure> {
-        let (held_cycle, mut other) = (self.held_cycle, None);
+        let (gravity_hold_cycle, mut other) = (self.gravity_hold_cycle, None);
         let ended = self.wait_for(within, |telemetry| {
             let mode = telemetry.record().mode();
             let is_other = !matches!(mode, None | Some(Mode::GravityHold | Mode::Fault));
-            if is_other && telemetry.state.cycle >= held_cycle {
+            if is_other && telemetry.state.cycle >= gravity_hold_cycle {
                 other = mode;
             }
             other.is_some() || condition(telemetry)
@@ -257,7 +260,7 @@ impl<const N: usize> RunningArm<N> {
         if let Some(arm) = arm {
             controller.arguments[arm + 1] = folder;
         }
-        if self.launched {
+        if self.loaded {
             let reader = &mut self.reader;
             let mut drain = || -> Result<(), Failure> {
                 while reader.receive().map_err(Failure::system)?.is_some() {}
@@ -267,7 +270,7 @@ impl<const N: usize> RunningArm<N> {
                 .end(CONTROLLER, SHUTDOWN_TIMEOUT, &mut drain)?;
             return self.children.start(&controller);
         }
-        self.launched = true;
+        self.loaded = true;
         if let Some(arm) = &self.plan.arm {
             self.children.start(arm)?;
         }
@@ -280,15 +283,18 @@ impl<const N: usize> RunningArm<N> {
         self.children.start(&self.plan.clock_owner)
     }
 
-    /// An arm without a pendant is active soon after gravity hold wants torque. After a loss, as of the controller, it is
-    /// laid down first, and its motors are enabled only if idle was requested since.
-    fn enable(&mut self, mut unless_idle_since: Option<u64>) -> Result<(), Failure> {
+    /// An arm without a pendant is active soon after gravity hold wants torque. After a loss, for instance of the
+    /// controller, the plant first lays the arm down, and enables its motors only if idle was requested since.
+    fn activate_without_pendant(
+        &mut self,
+        mut unless_idle_since: Option<u64>,
+    ) -> Result<(), Failure> {
         let period_s = self.model.settings().period_s;
         let cycles = |time_s: f64| (time_s / period_s) as u64;
         for _ in 0..ENABLING_ATTEMPTS {
-            self.hold(unless_idle_since)?;
-            let since = self.last.as_ref().map_or(0, |last| last.state.cycle);
-            self.wait_while_held(TIMEOUT, |telemetry| {
+            self.request_gravity_hold(unless_idle_since)?;
+            let since = self.gravity_hold_cycle;
+            self.wait_in_gravity_hold(TIMEOUT, |telemetry| {
                 telemetry.state.drives() == Drives::Active
                     || telemetry.state.cycle >= since + cycles(ENABLING_S)
             })?;
@@ -303,10 +309,10 @@ impl<const N: usize> RunningArm<N> {
             if active || fault {
                 return Ok(());
             }
-            unless_idle_since = Some(self.request(&Request::Idle)?.cycle + 1);
-            let since = self.last.as_ref().map_or(0, |last| last.state.cycle);
+            let since = self.request(&Request::Idle)?.cycle;
+            unless_idle_since = Some(since + 1);
             self.wait_for(TIMEOUT, |telemetry| {
-                telemetry.state.cycle >= since + cycles(HOLD_S)
+                telemetry.state.cycle >= since + cycles(SETTLE_S)
             })?;
         }
         Err(Failure::DrivesNotActive)
@@ -315,21 +321,21 @@ impl<const N: usize> RunningArm<N> {
     /// Active drives in gravity hold, unless somebody requested idle in the given cycle or after it.
     fn activate(&mut self, unless_idle_since: Option<u64>) -> Result<(), Failure> {
         if self.plan.lays_down {
-            self.enable(unless_idle_since)?;
+            self.activate_without_pendant(unless_idle_since)?;
         } else {
-            self.hold(unless_idle_since)?;
+            self.request_gravity_hold(unless_idle_since)?;
         }
-        let since = self.last.as_ref().map_or(0, |last| last.state.cycle);
+        let requested = self.gravity_hold_cycle;
         let period_s = self.model.settings().period_s;
-        let held = since + (HOLD_S / period_s) as u64;
+        let held = requested + (SETTLE_S / period_s) as u64;
         let active = |telemetry: &Telemetry| telemetry.state.drives() == Drives::Active;
-        self.wait_while_held(TIMEOUT, |telemetry| {
+        self.wait_in_gravity_hold(TIMEOUT, |telemetry| {
             telemetry.state.cycle >= held || active(telemetry)
         })?;
         let mut within = TIMEOUT;
         if let Some(pendant) = &self.plan.pendant {
-            let pressed = self.last.as_ref().is_some_and(active);
-            if !pressed {
+            let already_active = self.last.as_ref().is_some_and(active);
+            if !already_active {
                 pendant.press("activate")?;
             }
         } else if self.plant == PlantKind::Can
@@ -340,37 +346,35 @@ impl<const N: usize> RunningArm<N> {
             within = ACTIVATION_TIMEOUT;
         }
         let mut fault = None;
-        let up = self.wait_while_held(within, |telemetry| {
-            let record = telemetry.record();
-            fault = (record.fault != 0).then(|| record.fault_text.to_string());
+        let up = self.wait_in_gravity_hold(within, |telemetry| {
+            fault = fault_since(telemetry, requested);
             fault.is_some() || active(telemetry)
         })?;
         let settled = self.last.as_ref().map_or(0, |last| last.state.cycle);
-        let settled = settled + (HOLD_S / period_s) as u64;
+        let settled = settled + (SETTLE_S / period_s) as u64;
         if up && fault.is_none() {
-            self.wait_while_held(TIMEOUT, |telemetry| {
-                let record = telemetry.record();
-                fault = (record.fault != 0).then(|| record.fault_text.to_string());
+            self.wait_in_gravity_hold(TIMEOUT, |telemetry| {
+                fault = fault_since(telemetry, requested);
                 fault.is_some() || telemetry.state.cycle >= settled
             })?;
         }
-        match (up, fault) {
-            (true, None) => Ok(()),
-            (_, Some(fault)) => Err(Failure::RunFault { faults: fault }),
-            (false, None) => Err(Failure::DrivesNotActive),
+        match fault {
+            Some(fault) => Err(Failure::RunFault { faults: fault }),
+            None if up && self.last.as_ref().is_some_and(active) => Ok(()),
+            None => Err(Failure::DrivesNotActive),
         }
     }
 
-    fn performed(&mut self, steps: &[Step<N>]) -> Result<Performed, Failure> {
+    fn perform_steps(&mut self, steps: &[Step<N>]) -> Result<Performed, Failure> {
         let period_s = self.model.settings().period_s;
         let mut performed = Performed::default();
-        let (mut read, mut queued) = (VecDeque::new(), None);
+        let (mut unprocessed, mut queued) = (VecDeque::new(), None);
         for (number, step) in steps.iter().enumerate() {
             let sequence = match queued.take() {
                 Some(sequence) => sequence,
                 None => self.begin(&step.request, None)?,
             };
-            let reply = self.carried_out(sequence, &mut read)?;
+            let reply = self.wait_for_reply(sequence, &mut unprocessed)?;
             let end = reply.cycle + (step.duration_s / period_s).round() as u64;
             if let (false, Some(next)) = (step.until_done, steps.get(number + 1)) {
                 queued = Some(self.begin(&next.request, Some(end))?);
@@ -378,7 +382,7 @@ impl<const N: usize> RunningArm<N> {
             let mut collector = Motion::collector::<N>();
             let mut silent = Instant::now();
             loop {
-                let next = match read.pop_front() {
+                let next = match unprocessed.pop_front() {
                     Some(telemetry) => Some(telemetry),
                     None => self.poll()?,
                 };
@@ -393,7 +397,7 @@ impl<const N: usize> RunningArm<N> {
                     continue;
                 }
                 if telemetry.state.cycle >= end {
-                    read.push_front(telemetry);
+                    unprocessed.push_front(telemetry);
                     break;
                 }
                 let record = telemetry.record_of::<N>();
@@ -434,6 +438,7 @@ impl<const N: usize> RunningArm<N> {
                     collector.add(
                         telemetry.state.stamp_ns as f64 * 1e-9,
                         record.position_rad,
+                        // The fit has no ripple: the compensation of it is left out.
                         record.torque_nm - record.torques.ripple,
                         error_m,
                         record.in_contact,
@@ -451,6 +456,14 @@ impl<const N: usize> RunningArm<N> {
     }
 }
 
+/// The fault of a cycle that is not before `cycle`: telemetry that waits may be from before a reset.
+fn fault_since(telemetry: &Telemetry, cycle: u64) -> Option<String> {
+    let record = telemetry.record();
+    let faulted = record.fault != 0 && telemetry.state.cycle >= cycle;
+    faulted.then(|| record.fault_text.to_string())
+}
+
+/// Whether a fault is what a contact causes; a joint that something holds back exceeds its tracking error.
 fn is_contact(fault: u8) -> bool {
     matches!(
         fault,
@@ -464,16 +477,16 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
     fn load(&mut self, model: &Description) -> Result<(), Failure> {
         model.save(&self.folder)?;
         self.model = model.clone();
-        // An operator who requested idle of a controller that was just started has the last word.
+        // Idle that an operator requested of the controller that was just started is not overridden.
         let unless_idle_since = self.starts.then_some(0);
         if self.starts {
             self.launch()?;
-        } else if self.launched {
+        } else if self.loaded {
             return Err(Failure::OtherModelNeeded {
                 folder: self.folder.clone(),
             });
         }
-        self.launched = true;
+        self.loaded = true;
         self.activate(unless_idle_since)
     }
 
@@ -507,7 +520,7 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
             &self.options,
         )?;
         self.recorder = Some(recorder);
-        let performed = self.performed(steps);
+        let performed = self.perform_steps(steps);
         // The log is whole also after an error.
         let finished = self.finish_log();
         let performed = performed?;

@@ -105,7 +105,7 @@ fn teach_sized<const N: usize>(
         prefix: domain.prefix(),
         last: Instant::now(),
     };
-    let mut shown = RecordedMotion::default();
+    let mut recorded = RecordedMotion::default();
     let (mut start_ns, mut next_ns) = (None, 0);
     let until_s = args.for_s.unwrap_or(MAX_TEACH_S);
     let ended = loop {
@@ -132,14 +132,14 @@ fn teach_sized<const N: usize>(
         if stamp_ns >= next_ns {
             next_ns = stamp_ns + SAMPLE_NS;
             let tip_m = Vector3::from(record.tip_position_m);
-            shown.push(time_s, tip_m, record.position_rad.as_slice());
+            recorded.push(time_s, tip_m, record.position_rad.as_slice());
         }
     };
     let lost = stream.reader.lost() - lost_before;
     if ended == Mode::Float {
         session.send_request(&Request::GravityHold, None)?;
     }
-    let taught = shown.trimmed().ok_or(Failure::NothingTaught)?;
+    let taught = recorded.trimmed().ok_or(Failure::NothingTaught)?;
     taught
         .write(&args.file)
         .map_err(|error| Failure::Points(Box::new(error)))?;
@@ -252,8 +252,8 @@ fn perform_sized<const N: usize>(
         file: performance.file.to_owned(),
         reason,
     };
-    let (shown, speed) = match points {
-        Points::RecordedMotion(shown) => (shown.clone(), performance.speed),
+    let (recorded, speed) = match points {
+        Points::RecordedMotion(recorded) => (recorded.clone(), performance.speed),
         Points::Waypoints(points_m) => {
             let share = LIMIT_SHARE * performance.speed.min(1.0);
             let limits = &config.limits;
@@ -265,8 +265,8 @@ fn perform_sized<const N: usize>(
             (timed.map_err(|error| refused(error.to_string()))?, 1.0)
         }
     };
-    let repetition =
-        Repetition::plan(&controller, &shown, speed).map_err(|error| refused(error.to_string()))?;
+    let repetition = Repetition::plan(&controller, &recorded, speed)
+        .map_err(|error| refused(error.to_string()))?;
     if repetition.slowdown * speed > 1.05 {
         print_status(&format!(
             "the limits of the arm need {:.1} times the time",
@@ -331,8 +331,8 @@ fn perform_sized<const N: usize>(
             });
         }
         if (start_cycle..=end_cycle).contains(&cycle) {
-            let shown_m =
-                shown.tip_at(shown.time_s[0] + repetition.recorded_time_s(start_cycle, cycle));
+            let shown_m = recorded
+                .tip_at(recorded.time_s[0] + repetition.recorded_time_s(start_cycle, cycle));
             error.add((Vector3::from(record.tip_position_m) - shown_m).norm());
             cycles += 1;
         }

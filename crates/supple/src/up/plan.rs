@@ -63,7 +63,7 @@ impl Plan {
     ///
     /// # Errors
     /// Options that this plant does not support: [`Failure::Injection`], [`Failure::InjectionIntoRealArm`],
-    /// [`Failure::MisbehaviourWithoutMotors`], [`Failure::OptionsOfRealArm`], [`Failure::HandNeedsMode`],
+    /// [`Failure::MisbehaviourWithoutMotors`], [`Failure::OptionsOfRealArm`], [`Failure::NoBus`], [`Failure::HandNeedsMode`],
     /// [`Failure::VirtualTimeOnRealBus`]; [`Failure::System`] if the folder of an emulated bus does not belong to this user.
     pub fn new(
         args: &UpArgs,
@@ -72,11 +72,12 @@ impl Plan {
         cycles: Option<u64>,
     ) -> Result<Plan, Failure> {
         args.check_injections()?;
-        let emulates_damiao = args.plant == PlantKind::Emu && description.bus().is_some();
-        if !args.misbehave.is_empty() && !emulates_damiao {
+        let emulates_motors_on_bus = args.plant == PlantKind::Emu && description.bus().is_some();
+        if !args.misbehave.is_empty() && !emulates_motors_on_bus {
             return Err(Failure::MisbehaviourWithoutMotors);
         }
         args.check_plant_options()?;
+        args.check_bus_options()?;
         let controller = Program {
             name: CONTROLLER,
             arguments: args.timed_arguments(domain),
@@ -109,7 +110,7 @@ impl Plan {
             clock_owner,
             arm: None,
             pendant: None,
-            lays_down: args.plant != PlantKind::Sim && description.bus().is_some(),
+            lays_down: args.plant != PlantKind::Sim && description.falls_without_torque(),
         };
         if let Some(bus) = bus {
             let emulated = args.plant == PlantKind::Emu;
@@ -132,9 +133,9 @@ impl Plan {
                     name: "supple-emu",
                     arguments,
                 });
-                // Only a WAM has a pendant.
+                // Only arms with brakes have a pendant.
                 plan.pendant = match bus {
-                    _ if description.bus().is_some() => None,
+                    _ if plan.lays_down => None,
                     Address::Folder(_) => Pendant::of(&bus),
                     Address::Interface(_) => {
                         Pendant::of(&Address::of_system(domain.prefix()).map_err(Failure::system)?)
@@ -270,7 +271,9 @@ impl UpArgs {
 
     /// The simulated arm's options are checked before any process starts.
     fn check_plant_options(&self) -> Result<(), Failure> {
-        let given = !self.plant_options.to_arguments().is_empty();
+        let given = !self.plant_options.to_arguments().is_empty()
+            || self.block_m.is_some()
+            || self.trace.is_some();
         match self.plant {
             PlantKind::Can if given => Err(Failure::OptionsOfRealArm),
             plant => {
@@ -283,6 +286,19 @@ impl UpArgs {
                     _ => Ok(()),
                 }
             }
+        }
+    }
+
+    /// An option of the bus would be without effect on an arm without one.
+    fn check_bus_options(&self) -> Result<(), Failure> {
+        let options = [
+            ("--bus", self.bus.is_some()),
+            ("--zero-at-home", self.zero_at_home),
+            ("--tare", self.tare),
+        ];
+        match options.into_iter().find(|(_, given)| *given) {
+            Some((option, _)) if self.plant == PlantKind::Sim => Err(Failure::NoBus { option }),
+            _ => Ok(()),
         }
     }
 

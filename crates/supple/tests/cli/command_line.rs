@@ -147,6 +147,14 @@ fn invalid_plant_options_are_rejected_before_anything_starts() {
     let real = run(&[&up[..], &["can", "--realistic"]].concat());
     assert_eq!(real.code, Some(2), "{}", real.stderr);
     assert_one_clear_line(&real, &["--plant sim"]);
+    let block = run(&[&up[..], &["can", "--block-m", "0.1"]].concat());
+    assert_eq!(block.code, Some(2), "{}", block.stderr);
+    assert_one_clear_line(&block, &["--block-m", "--plant sim"]);
+    for option in [&["--bus", "can:can0"][..], &["--zero-at-home"], &["--tare"]] {
+        let no_bus = run(&[&up[..], &["sim"], option].concat());
+        assert_eq!(no_bus.code, Some(2), "{}", no_bus.stderr);
+        assert_one_clear_line(&no_bus, &[option[0], "--plant emu"]);
+    }
     let both = run(&[&up[..], &["sim", "--realistic", "--plant-options", file]].concat());
     assert_eq!(both.code, Some(2), "{}", both.stderr);
 }

@@ -4,8 +4,8 @@ use super::bus_time::BusTime;
 use super::cycle::cycle;
 use super::error::CanError;
 use super::start_up::{Progress, StartupConfig, start_up};
+use crate::cycles::{Ended, SEARCH_INTERVAL, open, run_until_shutdown, sum_counters};
 use crate::options::Options;
-use crate::serve::{Ended, SEARCH_INTERVAL, open, serve, sum_counters};
 use supple_bus::{Address, BusError};
 use supple_drive::{Counters, CycleConfig, SharedMemoryLink};
 use supple_ipc::{Domain, PlantLink};
@@ -100,7 +100,7 @@ fn run_joints<const N: usize>(
         (startup_config.zero_at_rad, startup_config.tare) = (None, false);
         let mut plant = cycle(bus, link, ready, &config, cycle_config)?;
         let names = config.joint_names;
-        let ended = serve(&mut plant, options.cycles, stop, names.as_slice())?;
+        let ended = run_until_shutdown(&mut plant, options.cycles, stop, names.as_slice())?;
         counters = sum_counters(&counters, plant.counters());
         let (drive, used_link) = plant.into_parts();
         (bus, link) = (drive.into_bus(), used_link);

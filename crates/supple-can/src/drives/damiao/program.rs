@@ -3,8 +3,8 @@
 use super::drive::{Damiao, budget};
 use super::error::DamiaoError;
 use super::start_up::{rates, start_up};
+use crate::cycles::{Ended, SEARCH_INTERVAL, open, run_until_shutdown, sum_counters};
 use crate::options::Options;
-use crate::serve::{Ended, SEARCH_INTERVAL, open, serve, sum_counters};
 use supple_bus::{Address, Bus, BusError};
 use supple_can_frame::BitRates;
 use supple_core::{Config, Vector};
@@ -136,7 +136,7 @@ fn run_joints<const N: usize>(
             plant.drive_mut().latch();
         }
         let names = config.joint_names;
-        let ended = serve(&mut plant, options.cycles, stop, names.as_slice())?;
+        let ended = run_until_shutdown(&mut plant, options.cycles, stop, names.as_slice())?;
         counters = sum_counters(&counters, plant.counters());
         let (drive, used_link) = plant.into_parts();
         (bus, link) = (drive.into_bus(), used_link);

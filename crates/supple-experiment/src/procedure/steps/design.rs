@@ -14,7 +14,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
     /// Whether the arm falls without torque: its motors may give less torque than is commanded, and gravity may need
     /// much of their limits.
     pub(super) fn falls(&self) -> bool {
-        self.start.bus().is_some()
+        self.start.falls_without_torque()
     }
 
     /// The pose through which heavy moves go, if the arm falls without torque.

@@ -32,7 +32,7 @@ const NAMED_SEEDS: usize = 10;
 /// # Errors
 /// [`Failure::Drill`] if a case exceeds what is allowed; [`Failure::NoSuchTestCase`] for an arm whose drives do not brake.
 pub(super) fn run(args: &DrillArgs, description: &Description, count: u64) -> Result<(), Failure> {
-    if description.bus().is_some() {
+    if description.falls_without_torque() {
         return Err(Failure::NoSuchTestCase {
             patterns: format!(
                 "--random of {}: random cases are for arms whose idle drives brake",

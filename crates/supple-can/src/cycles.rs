@@ -33,7 +33,7 @@ pub enum Ended {
 ///
 /// # Errors
 /// If the bus itself or the link to the controller fails.
-pub fn serve<const N: usize, D: Drive<N>>(
+pub fn run_until_shutdown<const N: usize, D: Drive<N>>(
     plant: &mut PlantLoop<N, D, SharedMemoryLink>,
     cycles: Option<u64>,
     stop: &Stop,

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use supple_cli::arguments::RunArgs;
 use supple_cli::arms;
-use supple_cli::console::{print_json, print_line};
+use supple_cli::console::{print_json, print_line, print_status};
 use supple_cli::exit::Failure;
 use supple_cli::out::Staging;
 use supple_experiment::calibrate::plant_of;
@@ -19,6 +19,7 @@ const MAX_BYTES: u64 = 1 << 20;
 /// The fields of a design's `summary.json` that are needed here.
 #[derive(Deserialize)]
 struct ExcitationDesign {
+    arm: String,
     moving: Vec<usize>,
     #[serde(flatten)]
     series: SeriesLists,
@@ -79,6 +80,13 @@ fn run_with_dof<const N: usize>(
     let staging = Staging::new(&args.out, &["summary.json", "logs/excitation.mcap"])?;
     let plant = plant_of::<N>(arm, &calibration)?;
     let effects = &calibration.plant;
+    if design.arm != arm.name() {
+        print_status(&format!(
+            "warning: the motion was designed for {}, and runs on {}",
+            design.arm,
+            arm.name()
+        ));
+    }
     let (config, home) = (arm.config::<N>()?, arm.home::<N>()?);
     if let Some(joint) = design.moving.iter().find(|joint| **joint >= N) {
         return Err(Failure::from(ReadError::Table {

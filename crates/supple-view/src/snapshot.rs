@@ -1,4 +1,4 @@
-//! A picture of the system: the latest cycle, with the greatest values since the previous picture, so that no peak
+//! A snapshot of the system: the latest cycle, with the greatest values since the previous snapshot, so that no peak
 //! falls between two.
 
 use crate::remedy::remedy;
@@ -9,7 +9,7 @@ use supple_core::math::Vector;
 
 /// What is known of a cycle besides its record.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Beside {
+pub struct CycleExtras {
     /// Time of the measurement, on any clock \[s\].
     pub time_s: f64,
     /// Since the previous cycle began, the delay of its step, and its duration \[us\].
@@ -33,9 +33,9 @@ pub struct FaultText {
     pub remedy: &'static str,
 }
 
-/// A picture. Joints in order; positions in base axes.
+/// State of the system at one time, as the page receives it. Joints in order; positions in base axes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Frame {
+pub struct Snapshot {
     /// Time of the measurement \[s\].
     pub time_s: f64,
     /// Cycle number.
@@ -52,7 +52,7 @@ pub struct Frame {
     pub reference_m: Option<[f32; 3]>,
     /// Greatest distance of the tip from its reference \[m\].
     pub tip_error_m: Option<f32>,
-    /// Force on the tip: measured, otherwise observed; the greatest since the previous picture \[N\].
+    /// Force on the tip: measured, otherwise observed; the greatest since the previous snapshot \[N\].
     pub force_n: [f32; 3],
     /// The force was measured by a sensor.
     pub force_is_measured: bool,
@@ -74,16 +74,16 @@ pub struct Frame {
     pub missed: u64,
     /// The latched fault.
     pub fault: Option<FaultText>,
-    /// The last refusal since the previous picture.
+    /// The last refusal since the previous snapshot.
     pub refusal: Option<String>,
     /// Learning is on.
     pub learning: bool,
 }
 
-/// Collects cycles until a picture is due.
+/// Collects cycles until a snapshot is due.
 #[derive(Debug)]
-pub struct Reducer<const N: usize> {
-    last: Option<(CycleRecord<N>, Beside)>,
+pub struct SnapshotBuilder<const N: usize> {
+    last: Option<(CycleRecord<N>, CycleExtras)>,
     tip_error_m: Option<f64>,
     force: (f64, [f64; 3]),
     timing_us: Option<[f64; 3]>,
@@ -91,9 +91,9 @@ pub struct Reducer<const N: usize> {
     refusal: Option<String>,
 }
 
-impl<const N: usize> Default for Reducer<N> {
+impl<const N: usize> Default for SnapshotBuilder<N> {
     fn default() -> Self {
-        Reducer {
+        SnapshotBuilder {
             last: None,
             tip_error_m: None,
             force: (-1.0, [0.0; 3]),
@@ -104,9 +104,9 @@ impl<const N: usize> Default for Reducer<N> {
     }
 }
 
-impl<const N: usize> Reducer<N> {
+impl<const N: usize> SnapshotBuilder<N> {
     /// Adds a cycle.
-    pub fn add(&mut self, record: &CycleRecord<N>, beside: Beside) {
+    pub fn add(&mut self, record: &CycleRecord<N>, extras: CycleExtras) {
         let greater = |old: Option<f64>, new: f64| old.map_or(new, |old| old.max(new));
         if let Some(error_m) = record.tip_error_m() {
             self.tip_error_m = Some(greater(self.tip_error_m, error_m));
@@ -116,20 +116,20 @@ impl<const N: usize> Reducer<N> {
         if size_n > self.force.0 {
             self.force = (size_n, force_n);
         }
-        if let Some(new) = beside.timing_us {
+        if let Some(new) = extras.timing_us {
             let old = self.timing_us.unwrap_or(new);
             self.timing_us = Some(core::array::from_fn(|i| old[i].max(new[i])));
         }
-        self.round_trip_us = self.round_trip_us.max(beside.round_trip_us);
+        self.round_trip_us = self.round_trip_us.max(extras.round_trip_us);
         if record.refusal != refusal_kind::NONE {
             self.refusal = Some(record.refusal_text.to_string());
         }
-        self.last = Some((*record, beside));
+        self.last = Some((*record, extras));
     }
 
-    /// The picture of the cycles since the last one; `None` without any.
-    pub fn take(&mut self) -> Option<Frame> {
-        let Reducer {
+    /// The snapshot of the cycles since the last one; `None` without any.
+    pub fn take(&mut self) -> Option<Snapshot> {
+        let SnapshotBuilder {
             last,
             tip_error_m,
             force: (_, force_n),
@@ -137,12 +137,12 @@ impl<const N: usize> Reducer<N> {
             round_trip_us,
             refusal,
         } = core::mem::take(self);
-        let (record, beside) = last?;
-        Some(Frame {
-            time_s: beside.time_s,
+        let (record, extras) = last?;
+        Some(Snapshot {
+            time_s: extras.time_s,
             cycle: record.cycle,
             mode: record.mode().map_or("unknown", |mode| mode.name()),
-            drives_active: record.drives_active || beside.held,
+            drives_active: record.drives_active || extras.held,
             joints_rad: joints(&record.position_rad),
             tip_m: narrow(record.tip_position_m),
             reference_m: record
@@ -163,7 +163,7 @@ impl<const N: usize> Reducer<N> {
             damping_n_s_per_m: narrow(record.damping_n_s_per_m),
             timing_us: timing_us.map(narrow),
             round_trip_us: round_trip_us as f32,
-            missed: beside.missed,
+            missed: extras.missed,
             fault: fault_name(record.fault).map(|name| FaultText {
                 name,
                 text: record.fault_text.to_string(),
@@ -201,7 +201,7 @@ mod tests {
 
     #[test]
     fn a_peak_between_two_pictures_is_in_the_later_one() {
-        let mut reducer = Reducer::default();
+        let mut builder = SnapshotBuilder::default();
         for (error_m, force_n, step_us) in
             [(0.001, 1.0, 20.0), (0.009, -30.0, 90.0), (0.002, 2.0, 10.0)]
         {
@@ -209,28 +209,28 @@ mod tests {
             record.has_reference = true;
             record.reference_position_m = [error_m, 0.0, 0.0];
             record.external_force_n = [0.0, 0.0, force_n];
-            let beside = Beside {
+            let extras = CycleExtras {
                 timing_us: Some([1000.0, 5.0, step_us]),
-                ..Beside::default()
+                ..CycleExtras::default()
             };
-            reducer.add(&record, beside);
+            builder.add(&record, extras);
         }
-        let frame = reducer.take().expect("a picture");
-        assert!((frame.tip_error_m.expect("a reference") - 0.009).abs() < 1e-7);
-        assert_eq!(frame.force_n, [0.0, 0.0, -30.0]);
-        assert_eq!(frame.timing_us, Some([1000.0, 5.0, 90.0]));
-        // The positions are those of the latest cycle, and nothing is left over for the next picture.
-        assert_eq!(frame.reference_m, Some([0.002, 0.0, 0.0]));
-        assert_eq!(reducer.take(), None);
+        let snapshot = builder.take().expect("a snapshot");
+        assert!((snapshot.tip_error_m.expect("a reference") - 0.009).abs() < 1e-7);
+        assert_eq!(snapshot.force_n, [0.0, 0.0, -30.0]);
+        assert_eq!(snapshot.timing_us, Some([1000.0, 5.0, 90.0]));
+        // The positions are those of the latest cycle, and nothing is left over for the next snapshot.
+        assert_eq!(snapshot.reference_m, Some([0.002, 0.0, 0.0]));
+        assert_eq!(builder.take(), None);
     }
 
     #[test]
     fn a_fault_comes_with_its_remedy() {
         let mut record = record();
         record.fault = supple_core::codes::fault_kind::TIP_SPEED;
-        let mut reducer = Reducer::default();
-        reducer.add(&record, Beside::default());
-        let fault = reducer.take().expect("a picture").fault.expect("a fault");
+        let mut builder = SnapshotBuilder::default();
+        builder.add(&record, CycleExtras::default());
+        let fault = builder.take().expect("a snapshot").fault.expect("a fault");
         assert_eq!(
             (fault.name, fault.remedy),
             ("tip_speed", remedy(record.fault))
