@@ -208,6 +208,11 @@ impl Simulation {
         0
     }
 
+    /// It never ends by itself.
+    fn ended(&self) -> Option<String> {
+        None
+    }
+
     /// Runs until more than `received` cycles are done. Signals such as Ctrl-C end it.
     fn wait(&self, py: Python<'_>, received: u64, timeout_s: f64) -> PyResult<bool> {
         let _ = timeout_s;
@@ -229,14 +234,17 @@ impl Simulation {
         }
     }
 
-    /// The cycles after the first `received`, as far as they are kept, as columns.
+    /// The cycles after the first `received`, as far as they are kept, as columns; `first` is how many came before them.
     fn read<'py>(&self, py: Python<'py>, received: u64) -> PyResult<Bound<'py, PyDict>> {
-        let cycles: Vec<Telemetry> = {
+        let (first, cycles): (u64, Vec<Telemetry>) = {
             let running = self.lock();
             let skipped = received.saturating_sub(running.dropped) as usize;
-            running.history.iter().skip(skipped).copied().collect()
+            let cycles = running.history.iter().skip(skipped).copied().collect();
+            (received.max(running.dropped), cycles)
         };
-        columns(py, self.dof, &cycles)
+        let read = columns(py, self.dof, &cycles)?;
+        read.set_item("first", first)?;
+        Ok(read)
     }
 
     /// The last cycle, as columns with one row.

@@ -89,6 +89,37 @@ def test_a_watching_connection_commands_nothing():
     assert watching.idle().mode == "idle"
 
 
+def test_a_stream_goes_on_where_it_is_after_cycles_were_dropped(system):
+    blocks = system.stream(every_s=0.1)
+    first = next(blocks)
+    system.wait(10.0)
+    second, third = next(blocks), next(blocks)
+    assert second.cycle[0] > first.cycle[-1] + 1
+    assert third.cycle[0] == second.cycle[-1] + 1
+
+
+def test_blocks_may_be_longer_than_a_second(system):
+    block = next(system.stream(every_s=1.5))
+    assert len(block) == 1500
+
+
+def test_a_model_comes_without_errors():
+    arm = supple.Arm.load("wam4")
+    with pytest.raises(ValueError, match="gravity_error.*model"):
+        supple.simulated(arm, model=arm, gravity_error=0.01)
+
+
+def test_a_late_set_point_starts_the_estimate_of_the_velocity_anew(system):
+    start = system.state.tip_position_m
+    with system.set_points(100.0, lead_s=0.05) as points:
+        for k in range(3):
+            points.send(start + along_y(1e-3 * k))
+        system.wait(1.0)
+        points.send(start + along_y(0.003), pace=False)
+        points.send(start + along_y(0.004), pace=False)
+        points.finish()
+
+
 def test_gains_change_along_a_ramp(system):
     system.gains(stiffness_n_per_m=[10.0, 20.0, 30.0], ramp_s=0.1)
     np.testing.assert_array_equal(system.wait(0.2).stiffness_n_per_m, [10.0, 20.0, 30.0])

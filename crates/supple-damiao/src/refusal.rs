@@ -1,5 +1,6 @@
 //! Why a start-up refuses a motor: register, found, expected and remedy.
 
+use crate::feedback::FeedbackError;
 use crate::firmware::{Firmware, FirmwareError};
 use crate::register::Register;
 use crate::status::Status;
@@ -21,6 +22,8 @@ pub enum Problem {
     Silent,
     /// More than one motor answers.
     TwoAnswers,
+    /// A frame with its reply id is not its feedback.
+    Reply(FeedbackError),
     /// It answers with another id than expected.
     ReplyId {
         /// Found.
@@ -94,6 +97,9 @@ impl Problem {
             Problem::TwoAnswers => {
                 "give every motor its own id, one at a time on the bus: `supple motors`"
             }
+            Problem::Reply(_) => {
+                "give every motor its own id and its own MST_ID, one at a time on the bus: `supple motors`"
+            }
             Problem::ReplyId { .. } => "set MST_ID of the motor, or reply_id in the arm's file",
             Problem::Format { .. } => {
                 "set can_br of all motors alike, and `format` in the arm's file to it"
@@ -133,6 +139,7 @@ impl fmt::Display for Problem {
         match self {
             Problem::Silent => write!(f, "does not answer"),
             Problem::TwoAnswers => write!(f, "two motors answer with this id"),
+            Problem::Reply(error) => write!(f, "{error}"),
             Problem::ReplyId { found, expected } => {
                 write!(f, "answers with id {found:#05x}, expected {expected:#05x}")
             }

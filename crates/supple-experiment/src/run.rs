@@ -59,7 +59,8 @@ pub struct Run {
     pub rms_error_m: f64,
     /// Maximum distance of the true tip from its reference \[m\].
     pub max_error_m: f64,
-    /// Root mean square of each torque term of shoulder pitch and elbow \[N m\].
+    /// Root mean square of each torque term of the second and third active joint, shoulder pitch and elbow of a WAM
+    /// \[N m\].
     pub torque_rms: [JointTorque; 2],
     /// The fault that ended the run early.
     pub ended: Option<FaultEnd>,
@@ -83,13 +84,13 @@ impl Run {
         }
     }
 
-    /// Whether it was left out.
+    /// Whether it has no samples: it was left out, or a fault ended it in its first cycle.
     pub fn is_left_out(&self) -> bool {
         self.trace.samples.is_empty()
     }
 }
 
-/// Called after every cycle of a run with the time since the start of the trajectory \[s\], `None` before it.
+/// Called after every cycle of a run with the time since the start of the trajectory \[s\], `None` before it and after a fault.
 /// An error ends the run.
 pub type CycleCallback<'a, const N: usize> =
     dyn FnMut(&Cycle<'_, N>, Option<f64>) -> Result<(), ExperimentError> + 'a;
@@ -117,7 +118,7 @@ pub fn run<const N: usize>(
     let end = track_at + cycles(plan.duration_s);
 
     let active = active_joints(config);
-    let shown = [active[1], active[2]];
+    let plotted = [active[1], active[2]];
     let mut error = Rms::default();
     let mut torques = [[Rms::default(); 4]; 2];
     let mut trace = Trace::default();
@@ -162,7 +163,7 @@ pub fn run<const N: usize>(
         }
         if let (Some(time_s), Some(reference)) = (time_s, output.reference) {
             error.add((reference.position - cycle.truth.tip_position_m).norm());
-            let terms = shown.map(|i| JointTorque::of(output, i));
+            let terms = plotted.map(|i| JointTorque::of(output, i));
             for (sums, term) in torques.iter_mut().zip(&terms) {
                 let JointTorque {
                     gravity,
@@ -187,10 +188,15 @@ pub fn run<const N: usize>(
         }
         k += 1;
     }
+    // A fault in the first cycle leaves no error, which is not a perfect run.
+    let (rms_m, max_m) = match error.is_empty() {
+        true => (f64::NAN, f64::NAN),
+        false => (error.rms(), error.max_abs()),
+    };
     Ok(Run {
         name: plan.name.clone(),
-        rms_error_m: error.rms(),
-        max_error_m: error.max_abs(),
+        rms_error_m: rms_m,
+        max_error_m: max_m,
         torque_rms: torques.map(|[gravity, friction, inertial, feedback]| JointTorque {
             gravity: gravity.rms(),
             friction: friction.rms(),

@@ -1,12 +1,12 @@
 //! Reads URDF and TOML into a validated arm.
 //!
-//! A [`Description`] is read from two files: a URDF with the joints and the inertial data of the links, and a
-//! TOML with all other data that a controller needs. Unphysical, non-finite, unconnected and misspelt data are
-//! rejected with file, element, value and remedy ([`ModelError`]), including errors that URDF parsers silently
-//! ignore.
+//! A [`Description`] is read from a URDF, with the joints and the inertial data of the links, and a TOML with all other
+//! data that a controller needs, or from a URDF alone. Unphysical, non-finite, unconnected and misspelt data are
+//! rejected with file, element, value and remedy ([`ModelError`]), or repaired on request, including errors that URDF
+//! parsers silently ignore.
 //!
-//! The crate depends on no simulator or controller: it provides [`supple_core::Arm`], [`supple_core::Config`]
-//! and the few extra numbers for simulation and drawing.
+//! The crate depends on no simulator and, of this project, on the core's types alone: it provides [`supple_core::Arm`],
+//! [`supple_core::Config`] and the few extra numbers for simulation and drawing.
 
 mod assets;
 mod bounds;

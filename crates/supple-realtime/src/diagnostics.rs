@@ -1,7 +1,8 @@
 //! Lines for standard error, which may be closed, full, or a paused terminal.
 //!
 //! A process that controls an arm must not block on the reader of its standard error, nor end if there is none: a
-//! background thread writes the lines. If the queue is full, lines are dropped, and the next line reports how many.
+//! background thread writes the lines. If the queue is full, messages are dropped; the next one that is accepted reports
+//! how many.
 
 use crate::background::BackgroundWriter;
 use core::fmt::Display;
@@ -16,18 +17,26 @@ const CAPACITY: usize = 256;
 const FLUSH_TIMEOUT: Duration = Duration::from_millis(300);
 
 static WRITER: OnceLock<Option<BackgroundWriter>> = OnceLock::new();
-/// Lines dropped since the last one that was written.
+/// Messages dropped since the last one that was accepted.
 static DROPPED: AtomicU64 = AtomicU64::new(0);
 
 /// Starts the writer thread and redirects panic messages to it. Call it at the start of a program, before realtime
 /// settings are applied.
 pub fn start() {
     if writer().is_some() {
-        std::panic::set_hook(Box::new(|panic| post(format_args!("{panic}"))));
+        std::panic::set_hook(Box::new(|panic| {
+            let thread = std::thread::current();
+            post(format_args!(
+                "thread {}: {panic}",
+                thread.name().unwrap_or("without a name")
+            ));
+            // The process may end without another word.
+            flush();
+        }));
     }
 }
 
-/// Queues a line, given without its line end; never blocks. It allocates, so threads that must not allocate cannot use
+/// Queues a line, given without its line end; after [`start`] it never blocks. It allocates, so threads that must not allocate cannot use
 /// it.
 pub fn post(line: impl Display) {
     post_part(format!("{line}\n"));
@@ -35,24 +44,18 @@ pub fn post(line: impl Display) {
 
 /// As [`post`], for text without a line end, such as a progress line that is overwritten.
 pub fn post_part(text: String) {
-    let accepted = writer().is_some_and(|writer| {
-        writer.submit(move || {
-            write(
-                &mut std::io::stderr(),
-                &text,
-                DROPPED.swap(0, Ordering::Relaxed),
-            )
-        })
-    });
+    let dropped = DROPPED.swap(0, Ordering::Relaxed);
+    let accepted = writer()
+        .is_some_and(|writer| writer.submit(move || write(&mut std::io::stderr(), &text, dropped)));
     if !accepted {
-        DROPPED.fetch_add(1, Ordering::Relaxed);
+        DROPPED.fetch_add(dropped + 1, Ordering::Relaxed);
     }
 }
 
 /// Waits briefly until the queued lines are written; call it last in a program. Returns false if they could not be
-/// written in time.
+/// written in time, or there is no thread that writes them.
 pub fn flush() -> bool {
-    writer().is_none_or(|writer| writer.flush(FLUSH_TIMEOUT))
+    writer().is_some_and(|writer| writer.flush(FLUSH_TIMEOUT))
 }
 
 fn writer() -> Option<&'static BackgroundWriter> {
@@ -65,7 +68,7 @@ fn writer() -> Option<&'static BackgroundWriter> {
 fn write(out: &mut impl Write, text: &str, dropped: u64) {
     let text = match dropped {
         0 => text.to_owned(),
-        n => format!("{n} lines were dropped here: standard error was blocked\n{text}"),
+        n => format!("{n} messages were dropped here: standard error was blocked\n{text}"),
     };
     let _ = out.write_all(text.as_bytes()).and_then(|()| out.flush());
 }
@@ -82,7 +85,7 @@ mod tests {
         let written = String::from_utf8(out).expect("text");
         assert_eq!(
             written,
-            "first\n3 lines were dropped here: standard error was blocked\nsecond\n"
+            "first\n3 messages were dropped here: standard error was blocked\nsecond\n"
         );
     }
 

@@ -10,8 +10,8 @@ use supple_experiment::Progress;
 
 /// Fraction of the work between two lines.
 const LINE_EVERY: f64 = 0.2;
-/// Steps of the bar.
-const STEPS: u64 = 1000;
+/// Resolution of the bar.
+const BAR_RESOLUTION: u64 = 1000;
 
 /// Reports progress on standard error.
 pub enum ProgressReporter {
@@ -32,7 +32,7 @@ impl ProgressReporter {
         if !std::io::stderr().is_terminal() {
             return ProgressReporter::Lines(Mutex::new(LINE_EVERY));
         }
-        let bar = ProgressBar::new(STEPS);
+        let bar = ProgressBar::new(BAR_RESOLUTION);
         if let Ok(style) = ProgressStyle::with_template("{bar:32} {percent:>3} %  {elapsed}  {msg}")
         {
             bar.set_style(style);
@@ -46,13 +46,14 @@ impl ProgressReporter {
         let fraction = progress.done_s / progress.total_s;
         match self {
             ProgressReporter::Bar(bar) => {
-                bar.set_position((fraction * STEPS as f64) as u64);
+                bar.set_position((fraction * BAR_RESOLUTION as f64) as u64);
                 bar.set_message(progress.finished.clone());
             }
             ProgressReporter::Lines(next) => {
                 let mut next = next.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
                 if fraction >= *next - 1e-9 {
-                    *next = (fraction / LINE_EVERY).floor() * LINE_EVERY + LINE_EVERY;
+                    // The fraction may be a rounding error below the one that is due.
+                    *next = (((fraction + 1e-9) / LINE_EVERY).floor() + 1.0) * LINE_EVERY;
                     let Progress {
                         done_s, total_s, ..
                     } = progress;
@@ -85,7 +86,7 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// So many steps are to come.
+    /// Work of `total` steps.
     pub fn new(total: usize, quiet: bool) -> Steps {
         Steps {
             total,
@@ -96,7 +97,7 @@ impl Steps {
         }
     }
 
-    /// Ends the last step and begins one.
+    /// Ends the running step and begins the next one.
     pub fn begin(&mut self, text: &str) {
         self.finish();
         self.begun += 1;
@@ -117,7 +118,7 @@ impl Steps {
         self.spinner = Some(spinner);
     }
 
-    /// Ends the last step; its line stays.
+    /// Ends the running step; its line stays.
     pub fn finish(&mut self) {
         if let Some(spinner) = self.spinner.take() {
             spinner.finish();

@@ -24,13 +24,13 @@ pub fn table(summary: &Summary) -> String {
 pub fn arm_notes(summary: &Summary) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(derived) = &summary.derived {
-        let worst = summary.perturbed_rms_m.iter().copied().fold(0.0, f64::max);
+        let worst_m = worst(&summary.perturbed_rms_m);
         lines.push(format!(
             "this arm weighs {} at the tip: a model 0.1 % and 3 % off may cost {} at 5 N/m (15 mm up to 23 N, then in \
              proportion); worst here: {}",
             newtons(derived.tip_weight_n),
             mm(derived.allowed_error_m),
-            mm(worst)
+            mm(worst_m)
         ));
     }
     let adapted = summary.adapted.iter();
@@ -73,7 +73,7 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
         .map(|at| format!("{} \u{d7}", at.speed))
         .collect();
     let exact = &summary.sinusoid_exact_model;
-    let worst = summary.perturbed_rms_m.iter().copied().fold(0.0, f64::max);
+    let worst_m = worst(&summary.perturbed_rms_m);
     let torque = |t: &JointTorque| {
         let terms = [t.gravity, t.friction, t.feedback].map(figures);
         format!("{} N m", terms.join(", "))
@@ -100,18 +100,21 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
                 "  {} perturbed models: median, worst",
                 summary.perturbed_rms_m.len()
             ),
-            millimetres(&[median(&summary.perturbed_rms_m).unwrap_or(0.0), worst]),
+            millimetres(&[
+                median(&summary.perturbed_rms_m).unwrap_or(f64::NAN),
+                worst_m,
+            ]),
             "",
         ),
         line(
-            "  exact model, no load friction: Coulomb, Stribeck",
+            "  exact model, plant without load-dependent friction: Coulomb, Stribeck",
             rms(&[&exact.coulomb, &exact.stribeck]),
             "",
         ),
         line(
-            "  apparent inertia of 1 kg by the sensor",
+            "  apparent mass of 1 kg by force feedback",
             rms(&[&summary.sinusoid_apparent_inertia]),
-            "(3.6) whole",
+            "full Eq. (3.6)",
         ),
         line(
             "  (3.6) exactly as printed",
@@ -151,18 +154,18 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
         line(
             "shoulder: gravity, friction, feedback",
             torque(&summary.torque_rms.shoulder_pitch),
-            "in this order (fig. 4)",
+            "largest to smallest in this order (fig. 4)",
         ),
         line(
             "elbow: gravity, friction, feedback",
             torque(&summary.torque_rms.elbow),
-            "in this order (fig. 4)",
+            "largest to smallest in this order (fig. 4)",
         ),
     ]);
     lines
 }
 
-/// Names of the plant of most rows, and of the calibrated one.
+/// Names of the plant of most rows, and of the one on which the model is calibrated.
 pub(crate) fn plants(summary: &Summary) -> (&'static str, &'static str) {
     match summary.plant.is_none() {
         true => ("ideal plant", "realistic plant"),
@@ -172,10 +175,8 @@ pub(crate) fn plants(summary: &Summary) -> (&'static str, &'static str) {
 
 /// The plant with all effects of a real arm, first: the other rows leave these out.
 fn realistic(found: &Realistic, imperfect: &str) -> Vec<Line> {
-    let median_and_worst = |errors: &[f64]| {
-        let worst = errors.iter().copied().fold(0.0, f64::max);
-        millimetres(&[median(errors).unwrap_or(0.0), worst])
-    };
+    let median_and_worst =
+        |errors: &[f64]| millimetres(&[median(errors).unwrap_or(f64::NAN), worst(errors)]);
     let mut faults = match found.ended.len() {
         0 => String::new(),
         faults => format!(", {faults} ended by a fault"),
@@ -185,7 +186,7 @@ fn realistic(found: &Realistic, imperfect: &str) -> Vec<Line> {
     }
     vec![
         line(
-            &format!("{imperfect}, calibrated and learning: sinusoid at 5 N/m"),
+            &format!("{imperfect}, calibrated and learning: sinusoid at 5 N/m; median, worst"),
             format!("{}{faults}", median_and_worst(&found.sinusoid_rms_m)),
             "follows closely (fig. 3a)",
         ),
@@ -201,11 +202,15 @@ fn realistic(found: &Realistic, imperfect: &str) -> Vec<Line> {
             "",
         ),
         line(
-            "  calibrated alone: sinusoid",
+            "  calibrated, without learning: sinusoid",
             median_and_worst(&found.calibrated_sinusoid_rms_m),
             "",
         ),
-        line("  false contacts", found.false_latches.to_string(), ""),
+        line(
+            "  false contacts in all learning runs",
+            found.false_latches.to_string(),
+            "",
+        ),
     ]
 }
 
@@ -239,7 +244,12 @@ fn contact(summary: &Summary) -> Vec<Line> {
         })
     };
     let soft = lines.iter().filter(|e| e.stiffness_n_per_m < 5.0);
-    let soft: Vec<_> = soft.map(|e| plain(e.contact.impulse_newton_s, 2)).collect();
+    let (soft_stiffness, soft): (Vec<_>, Vec<_>) = soft
+        .map(|e| {
+            let impulse = plain(e.contact.impulse_newton_s, 2);
+            (figures(e.stiffness_n_per_m), impulse)
+        })
+        .unzip();
     let impacts: Vec<_> = lines.iter().map(|e| e.contact.impact_newton_s).collect();
     let theory: Vec<_> = lines.iter().map(|e| e.impact_theory_newton_s).collect();
     let peak_at_five = |lines: &[ProbingSummary]| {
@@ -248,12 +258,12 @@ fn contact(summary: &Summary) -> Vec<Line> {
     };
     vec![
         line(
-            "first transient, median over K",
+            "first transient, median over K from 5 N/m",
             or_none(median(&peaks).map(newtons)),
             "about 20 N (fig. 5)",
         ),
         line(
-            "  its spread over K",
+            "  its spread over these K",
             or_none(summary.contact.peak_spread.map(percent)),
             "largely independent of K",
         ),
@@ -269,13 +279,13 @@ fn contact(summary: &Summary) -> Vec<Line> {
             "rubber: much lower (section 5)",
         ),
         line(
-            "force while pressing at 5 N/m, of the spring's",
+            "pressing force at 5 N/m, of the spring's K (Xo - X)",
             or_none(pressing(5.0)),
             "",
         ),
         line("  at 125 N/m", or_none(pressing(125.0)), ""),
         line(
-            "impulse at 0.5, 1 and 2 N/m",
+            &format!("impulse at {} N/m", soft_stiffness.join(", ")),
             format!("{} N s", soft.join(", ")),
             "not zero at K = 0 (fig. 6)",
         ),
@@ -289,17 +299,22 @@ fn contact(summary: &Summary) -> Vec<Line> {
             "contribution of the impact",
         ),
         line(
-            "impulse over K from 5 N/m, fade on",
+            "impulse over K from 5 N/m, friction compensation faded in contact",
             fit(&summary.contact),
             "linear (fig. 6)",
         ),
-        line("  fade off", fit(&summary.fade_off), ""),
+        line("  kept in contact", fit(&summary.fade_off), ""),
         line(
-            "  first 50 ms, median, fade on",
+            "  first 50 ms, faded, median over all K",
             or_none(median(&first).map(newton_seconds)),
             "",
         ),
     ]
+}
+
+/// The largest of the numbers; not a number without any.
+pub(crate) fn worst(values: &[f64]) -> f64 {
+    values.iter().copied().fold(f64::NAN, f64::max)
 }
 
 fn rms(runs: &[&TrackingError]) -> String {

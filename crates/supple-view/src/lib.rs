@@ -35,7 +35,7 @@ pub use error::ViewError;
 
 use http::Gate;
 use hub::Hub;
-use live::Live;
+use live::LiveConnection;
 use serde::Serialize;
 use server::Shown;
 use std::path::PathBuf;

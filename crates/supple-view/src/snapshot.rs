@@ -1,5 +1,5 @@
-//! A snapshot of the system: the latest cycle, with the greatest values since the previous snapshot, so that no peak
-//! falls between two.
+//! A snapshot of the system: the latest cycle, with the greatest error, force and times since the previous snapshot and
+//! any contact, so that none of these falls between two.
 
 use crate::remedy::remedy;
 use serde::Serialize;
@@ -12,7 +12,7 @@ use supple_core::math::Vector;
 pub struct CycleExtras {
     /// Time of the measurement, on any clock \[s\].
     pub time_s: f64,
-    /// Since the previous cycle began, the delay of its step, and its duration \[us\].
+    /// Period since the previous cycle, latency from the measurement to the start of the step, duration of the step \[us\].
     pub timing_us: Option<[f64; 3]>,
     /// From the state to its answer \[us\]; 0 if unknown.
     pub round_trip_us: f64,
@@ -54,17 +54,17 @@ pub struct Snapshot {
     pub tip_error_m: Option<f32>,
     /// Force on the tip: measured, otherwise observed; the greatest since the previous snapshot \[N\].
     pub force_n: [f32; 3],
-    /// The force was measured by a sensor.
+    /// That force was measured by a sensor.
     pub force_is_measured: bool,
-    /// Contact is latched.
+    /// Contact was latched in a cycle since the previous snapshot.
     pub in_contact: bool,
     /// Joint torques \[N m\].
     pub torque_nm: Vec<f32>,
     /// Each term of the torque, as `terms` of the page's description lists them, for each joint \[N m\].
     pub terms_nm: Vec<Vec<f32>>,
-    /// Stiffness in force \[N/m\].
+    /// Stiffness now in effect \[N/m\].
     pub stiffness_n_per_m: [f32; 3],
-    /// Damping in force \[N s/m\].
+    /// Damping now in effect \[N s/m\].
     pub damping_n_s_per_m: [f32; 3],
     /// Greatest period, delay and duration of a step \[us\].
     pub timing_us: Option<[f32; 3]>,
@@ -85,7 +85,9 @@ pub struct Snapshot {
 pub struct SnapshotBuilder<const N: usize> {
     last: Option<(CycleRecord<N>, CycleExtras)>,
     tip_error_m: Option<f64>,
-    force: (f64, [f64; 3]),
+    /// The greatest force, its size, and whether a sensor measured it \[N\].
+    force: (f64, [f64; 3], bool),
+    in_contact: bool,
     timing_us: Option<[f64; 3]>,
     round_trip_us: f64,
     refusal: Option<String>,
@@ -96,7 +98,8 @@ impl<const N: usize> Default for SnapshotBuilder<N> {
         SnapshotBuilder {
             last: None,
             tip_error_m: None,
-            force: (-1.0, [0.0; 3]),
+            force: (-1.0, [0.0; 3], false),
+            in_contact: false,
             timing_us: None,
             round_trip_us: 0.0,
             refusal: None,
@@ -114,8 +117,9 @@ impl<const N: usize> SnapshotBuilder<N> {
         let force_n = force_of(record);
         let size_n = force_n.iter().map(|part| part * part).sum::<f64>().sqrt();
         if size_n > self.force.0 {
-            self.force = (size_n, force_n);
+            self.force = (size_n, force_n, record.has_tip_force);
         }
+        self.in_contact |= record.in_contact;
         if let Some(new) = extras.timing_us {
             let old = self.timing_us.unwrap_or(new);
             self.timing_us = Some(core::array::from_fn(|i| old[i].max(new[i])));
@@ -132,7 +136,8 @@ impl<const N: usize> SnapshotBuilder<N> {
         let SnapshotBuilder {
             last,
             tip_error_m,
-            force: (_, force_n),
+            force: (_, force_n, force_is_measured),
+            in_contact,
             timing_us,
             round_trip_us,
             refusal,
@@ -150,8 +155,8 @@ impl<const N: usize> SnapshotBuilder<N> {
                 .then(|| narrow(record.reference_position_m)),
             tip_error_m: tip_error_m.map(|error_m| error_m as f32),
             force_n: narrow(force_n),
-            force_is_measured: record.has_tip_force,
-            in_contact: record.in_contact,
+            force_is_measured,
+            in_contact,
             torque_nm: joints(&record.torque_nm),
             terms_nm: record
                 .torques
@@ -209,6 +214,7 @@ mod tests {
             record.has_reference = true;
             record.reference_position_m = [error_m, 0.0, 0.0];
             record.external_force_n = [0.0, 0.0, force_n];
+            record.in_contact = force_n == -30.0;
             let extras = CycleExtras {
                 timing_us: Some([1000.0, 5.0, step_us]),
                 ..CycleExtras::default()
@@ -218,6 +224,7 @@ mod tests {
         let snapshot = builder.take().expect("a snapshot");
         assert!((snapshot.tip_error_m.expect("a reference") - 0.009).abs() < 1e-7);
         assert_eq!(snapshot.force_n, [0.0, 0.0, -30.0]);
+        assert!(snapshot.in_contact);
         assert_eq!(snapshot.timing_us, Some([1000.0, 5.0, 90.0]));
         // The positions are those of the latest cycle, and nothing is left over for the next snapshot.
         assert_eq!(snapshot.reference_m, Some([0.002, 0.0, 0.0]));

@@ -27,12 +27,12 @@ class Refused(RuntimeError):
 
 @dataclass(frozen=True)
 class Answer:
-    """The controller's answer to a request that it carries out."""
+    """The controller's answer to a request that it has accepted or, with ``at_cycle``, queued."""
 
     cycle: int
     """Cycle in which it was received."""
     mode: str
-    """Mode after it."""
+    """Mode when it answered."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,17 +113,16 @@ class States(Tabular):
 def connect(prefix: str | None = None, *, watch: bool = False, timeout_s: float = 5.0) -> System:
     """Connect to a running system, such as one that ``supple up`` has started.
 
-    Any number of programs up to five watch; one Python program at a time commands; the command line
-    and the live page may intervene at any time. The first command takes the right to,
-    until the connection is closed; the error that another program gets names the process that has it. The
-    controller checks every request.
+    At most five programs may be connected. One Python program at a time may command: the first command acquires that
+    right until the connection is closed, and the error that another program gets names the process that has it. The
+    command line and the live page may intervene at any time. The controller checks every request.
 
     Parameters
     ----------
     prefix : str, optional
         The system's ``--prefix``. Default: ``SUPPLE_PREFIX``, or else ``supple``.
     watch : bool
-        Refuse every command from this connection.
+        Refuse every command from this connection, except :meth:`System.idle`.
     timeout_s : float
         Longest wait for the system's telemetry (s), zero or more.
 
@@ -135,7 +134,7 @@ def connect(prefix: str | None = None, *, watch: bool = False, timeout_s: float 
     Raises
     ------
     ConnectionError
-        If no system runs under the prefix, or all places of viewers are taken.
+        If no system runs under the prefix, or five programs are connected already.
     ValueError
         If the prefix cannot be one.
 
@@ -180,7 +179,7 @@ def simulated(
     stiffness_n_per_m : float
         Stiffness of the tip on each axis (N/m).
     gravity_error, friction_error : float
-        Relative errors of the controller's model, with signs drawn from ``seed``.
+        Relative errors of the controller's model, with signs drawn from ``seed``; not together with ``model``.
     block : bool
         Put the block of the paper's figure 5 beside the arm.
     seed : int
@@ -211,6 +210,8 @@ def simulated(
     stiffness_n_per_m = number("stiffness_n_per_m", stiffness_n_per_m)
     gravity_error = number("gravity_error", gravity_error)
     friction_error = number("friction_error", friction_error)
+    if model is not None and (gravity_error or friction_error):
+        raise ValueError("gravity_error, friction_error: expected 0 if model is given")
     block = flag("block", block)
     start = None
     if start_rad is not None:
@@ -314,7 +315,8 @@ class System:
         Parameters
         ----------
         duration_s : float
-            Time on the controller's clock (s), zero or more; up to 8 s at 1 kHz are kept.
+            Time on the controller's clock (s), zero or more. Of more than 8192 cycles the beginning is lost: use
+            :meth:`stream` for them.
 
         Returns
         -------
@@ -343,18 +345,23 @@ class System:
         return _states(self._native.read(begin), self.period_s)
 
     def stream(self, every_s: float = 0.05) -> Iterator[States]:
-        """Blocks of cycles as they come, without a gap, until the system ends or the loop is left.
+        """Blocks of cycles as they come, until no more come or the loop is left.
+
+        There is no gap as long as each block is used within the 8192 cycles that are kept.
 
         Parameters
         ----------
         every_s : float
-            Time between two blocks (s).
+            Time between two blocks (s). The stream ends if no cycle comes for a second more than that.
         """
         received = self._native.received()
         cycles = max(1, round(every_s / self.period_s))
-        while self._native.wait(received + cycles - 1, 1.0):
+        while True:
+            self._native.wait(received + cycles - 1, every_s + 1.0)
             block = self._native.read(received)
-            received += len(block["cycle"])
+            if not len(block["cycle"]):
+                return
+            received = block["first"] + len(block["cycle"])
             yield _states(block, self.period_s)
 
     def wait(self, duration_s: float) -> State:
@@ -370,7 +377,8 @@ class System:
             before = self._native.received()
             if not self._native.wait(before, 5.0):
                 raise ConnectionError(
-                    f"no telemetry from the system {self.prefix!r} for 5 s: `supple status` shows whether it runs"
+                    f"no telemetry from the system {self.prefix!r}, {self._native.ended() or 'for 5 s'}: "
+                    "`supple status` shows whether it runs"
                 )
         return self.state
 
@@ -393,7 +401,7 @@ class System:
         values : array_like
             Numbers of the request, in the order that the log's ``ControllerState`` lists.
         trajectory : str, optional
-            Of a track request: ``"hold"``, ``"line"``, ``"sinusoid"``, ``"arc"``, ``"quadrant"``, ``"probe"``.
+            Of a request ``"track"`` or ``"track_pose"``: ``"hold"``, ``"line"``, ``"sinusoid"``, ``"arc"``, ``"quadrant"``, ``"probe"``.
         at_cycle : int, optional
             Cycle in which it takes effect. Default: the next one.
 
@@ -413,7 +421,7 @@ class System:
         return Answer(cycle, mode)
 
     def idle(self) -> Answer:
-        """Take the torque off. It passes every queue, and works from a watching connection too."""
+        """Take the torque off. It bypasses the queue of requests, and works from a watching connection too."""
         cycle, mode = self._native.idle()
         self._see(cycle)
         return Answer(cycle, mode)
@@ -440,7 +448,7 @@ class System:
         duration_s : float
             Duration (s).
         wait : bool
-            Return when it is done.
+            Return after its duration; the state's mode tells whether something has ended it.
         """
         target = self._joints("target_rad", target_rad)
         answer = self.request("move", [*target, duration_s])
@@ -460,7 +468,7 @@ class System:
         duration_s : float
             Duration of the way there (s).
         wait : bool
-            Return when it is done.
+            Return after its duration; the state's mode tells whether something has ended it.
         """
         target = self.state.q if target_rad is None else self._joints("target_rad", target_rad)
         answer = self.request("joint_impedance", [*target, duration_s])
@@ -532,7 +540,7 @@ class System:
         duration_s : float
             Duration of the rotation (s).
         wait : bool
-            Return when it is done.
+            Return after its duration; the state's mode tells whether something has ended it.
         """
         direction = _axes("axis", axis, None)
         length = float(np.linalg.norm(direction))
@@ -579,7 +587,7 @@ class System:
         duration_s : float
             Duration (s).
         wait : bool
-            Return when it is done.
+            Return after its duration; the state's mode tells whether something has ended it.
         """
         values = [*self._reference_m(), *_axes("to_m", to_m, None), duration_s]
         answer = self.request("track", values, trajectory="line")
@@ -599,11 +607,11 @@ class System:
         frequency_hz : float
             Frequency (Hz).
         centre_m : array_like, (3,), optional
-            Centre, where it begins, base axes (m). Default: where the tip is.
+            Centre, where it begins, base axes (m). Default: the tip's reference, or the tip without one.
         ramp_s : float
             Time in which it reaches its speed (s).
         """
-        centre = _axes("centre_m", centre_m, self.state.tip_position_m)
+        centre = _axes("centre_m", centre_m, self._reference_m())
         amplitude = _axes("amplitude_m", amplitude_m, None)
         values = [*centre, *amplitude, 2.0 * np.pi * frequency_hz, ramp_s]
         return self.request("track", values, trajectory="sinusoid")
@@ -665,8 +673,7 @@ class SetPoints:
         self._lead_s = lead_s
         self._begin = 0
         self._sent = 0
-        self._time_s = 0.0
-        self._last: list[tuple[float, Array]] = []
+        self._last: list[Array] = []
 
     def __enter__(self) -> Self:
         self._system.hold()
@@ -703,12 +710,12 @@ class SetPoints:
         position_m : array_like, (3,)
             Position, base axes (m).
         velocity_m_per_s : array_like, (3,), optional
-            Velocity there (m/s). Default: from the last three positions.
+            Velocity there (m/s). Default: from the last three positions; zero at the first, and after a late one.
         acceleration_m_per_s2 : array_like, (3,), optional
             Acceleration there (m/s^2). Default: zero.
         pace : bool
-            Wait until it is due. Without it the caller keeps the time: a set-point that comes too late is
-            skipped, and the time goes on from the present one.
+            Wait until it is due. Without it the caller keeps the time. A set-point that comes too late is passed
+            ``lead_s`` from now, and the later ones follow it.
 
         Raises
         ------
@@ -718,14 +725,9 @@ class SetPoints:
         """
         native, period_s = self._system._native, self._system.period_s
         position = _axes("position_m", position_m, None)
-        time_s = self._sent * self._interval_s
-        if velocity_m_per_s is None:
-            velocity = self._estimate(time_s, position)
-        else:
-            velocity = _axes("velocity_m_per_s", velocity_m_per_s, None)
+        given = None if velocity_m_per_s is None else _axes("velocity_m_per_s", velocity_m_per_s, None)
         acceleration = _axes("acceleration_m_per_s2", acceleration_m_per_s2, np.zeros(3))
-        self._last = [*self._last[-1:], (time_s, position)]
-        at_cycle = self._begin + round(time_s / period_s)
+        at_cycle = self._begin + round(self.time_s / period_s)
         self._raise_refusal()
         lead = round(self._lead_s / period_s)
         if pace:
@@ -735,6 +737,9 @@ class SetPoints:
             # The caller was away for longer than the lead: the reference rests or is about to.
             self._begin += late + lead
             at_cycle += late + lead
+            self._last.clear()
+        velocity = self._estimate(position) if given is None else given
+        self._last = [*self._last[-1:], position]
         native.set_point(position.tolist(), velocity.tolist(), acceleration.tolist(), at_cycle)
         self._sent += 1
 
@@ -753,26 +758,29 @@ class SetPoints:
         self._raise_refusal()
         return state
 
-    def _estimate(self, time_s: float, position: Array) -> Array:
-        """Velocity at the last of up to three equally spaced points."""
+    def _estimate(self, position: Array) -> Array:
+        """Velocity at the last of up to three equally spaced points; zero at the first."""
         if not self._last:
             return np.zeros(3)
         h = self._interval_s
         if len(self._last) == 1:
-            return np.asarray((position - self._last[-1][1]) / h)
-        return np.asarray((3.0 * position - 4.0 * self._last[-1][1] + self._last[-2][1]) / (2.0 * h))
+            return np.asarray((position - self._last[-1]) / h)
+        return np.asarray((3.0 * position - 4.0 * self._last[-1] + self._last[-2]) / (2.0 * h))
 
     def _wait_until(self, cycle: int) -> None:
-        native = self._system._native
+        native, slept_at = self._system._native, -1
         while True:
-            missing = cycle - native.cycle()
+            now = native.cycle()
+            missing = cycle - now
             if missing <= 0:
                 return
-            # Most of the wait without a lock; the last cycles as they come.
-            if self._system.is_live and missing * self._system.period_s > 0.02:
+            # Sleep for most of the wait as long as cycles come; then wait for each.
+            if self._system.is_live and missing * self._system.period_s > 0.02 and now != slept_at:
+                slept_at = now
                 time.sleep(0.5 * missing * self._system.period_s)
             elif not native.wait(native.received(), 5.0):
-                raise ConnectionError(f"no telemetry from the system {self._system.prefix!r} for 5 s")
+                reason = native.ended() or "for 5 s"
+                raise ConnectionError(f"no telemetry from the system {self._system.prefix!r}, {reason}")
 
     def _raise_refusal(self) -> None:
         refusal = self._system._native.take_refusal()

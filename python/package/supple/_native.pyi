@@ -711,11 +711,15 @@ class Connection:
     def lost(self) -> int:
         """Cycles that did not reach this connection."""
 
+    def ended(self) -> str | None:
+        """Why the connection has ended, if it has."""
+
     def wait(self, received: int, timeout_s: float) -> bool:
         """Waits until more than `received` cycles have come; returns whether there are more. Signals such as Ctrl-C end it."""
 
     def read(self, received: int) -> dict[str, Any]:
-        """The cycles after the first `received`, as far as they are kept, as columns; `modes` and `faults` are lists."""
+        """The cycles after the first `received`, as far as they are kept, as columns; `modes` and `faults` are lists, `first`
+        is how many cycles came before them."""
 
     def latest(self) -> dict[str, Any]:
         """The last cycle, as columns with one row."""
@@ -767,11 +771,14 @@ class Simulation:
     def lost(self) -> int:
         """None is ever lost."""
 
+    def ended(self) -> str | None:
+        """It never ends by itself."""
+
     def wait(self, received: int, timeout_s: float) -> bool:
         """Runs until more than `received` cycles are done. Signals such as Ctrl-C end it."""
 
     def read(self, received: int) -> dict[str, Any]:
-        """The cycles after the first `received`, as far as they are kept, as columns."""
+        """The cycles after the first `received`, as far as they are kept, as columns; `first` is how many came before them."""
 
     def latest(self) -> dict[str, Any]:
         """The last cycle, as columns with one row."""

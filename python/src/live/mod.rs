@@ -89,6 +89,11 @@ impl Connection {
         self.with(|worker| Ok(worker.with_history(|history| history.lost)))
     }
 
+    /// Why the connection has ended, if it has.
+    fn ended(&self) -> PyResult<Option<String>> {
+        self.with(|worker| Ok(worker.with_history(|history| history.ended.clone())))
+    }
+
     /// Waits until more than `received` cycles have come; returns whether there are more. Signals such as Ctrl-C end it.
     fn wait(&self, py: Python<'_>, received: u64, timeout_s: f64) -> PyResult<bool> {
         let timeout = seconds("timeout_s", timeout_s)?;
@@ -108,17 +113,21 @@ impl Connection {
         }
     }
 
-    /// The cycles after the first `received`, as far as they are kept, as columns; `modes` and `faults` are lists.
+    /// The cycles after the first `received`, as far as they are kept, as columns; `modes` and `faults` are lists, `first`
+    /// is how many cycles came before them.
     fn read<'py>(&self, py: Python<'py>, received: u64) -> PyResult<Bound<'py, PyDict>> {
-        let cycles: Vec<Telemetry> = py.detach(|| {
+        let (first, cycles): (u64, Vec<Telemetry>) = py.detach(|| {
             self.with(|worker| {
                 Ok(worker.with_history(|history| {
                     let skipped = received.saturating_sub(history.dropped) as usize;
-                    history.cycles.iter().skip(skipped).copied().collect()
+                    let cycles = history.cycles.iter().skip(skipped).copied().collect();
+                    (received.max(history.dropped), cycles)
                 }))
             })
         })?;
-        columns(py, self.dof, &cycles)
+        let read = columns(py, self.dof, &cycles)?;
+        read.set_item("first", first)?;
+        Ok(read)
     }
 
     /// The last cycle, as columns with one row.

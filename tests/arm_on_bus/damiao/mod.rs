@@ -1,7 +1,7 @@
-//! Arms of Damiao motors: the drive of `supple-can` against the emulated motors, in virtual time.
+//! Arms of Damiao motors: the driver of `supple-can` (its `Drive`) against emulated motors, in virtual time.
 
 mod faults;
-mod regular;
+mod normal_operation;
 mod rig;
 mod start_up;
 mod wrong_zero;

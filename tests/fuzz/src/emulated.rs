@@ -23,6 +23,7 @@ fn emulator() -> Emulator<4> {
         (plant, description.home().expect("four joints"))
     });
     let config = EmulatorConfig {
+        // Its encoders have their zero: it starts in idle.
         zeroed: true,
         ..EmulatorConfig::wam(4)
     };
@@ -43,7 +44,7 @@ pub fn pendant_line(data: &[u8]) {
     }
 }
 
-/// Raw frames of a host, 16 bytes each.
+/// Raw frames of a host, 16 bytes each: data frames are sent, error frames only pass the codec both ways.
 pub fn arm_bus(data: &[u8]) {
     let mut emulator = emulator();
     for raw in data.chunks_exact(CAN_FRAME_BYTES).take(FRAMES) {
@@ -69,7 +70,7 @@ pub fn arm_bus(data: &[u8]) {
     }
 }
 
-/// Advances the emulator by a time.
+/// Advances the emulator by a time; it pauses at each frame that a node sends.
 fn run(emulator: &mut Emulator<4>, ns: u64) {
     let until_ns = emulator.now_ns() + ns;
     while emulator.run_until(until_ns).is_some() {}

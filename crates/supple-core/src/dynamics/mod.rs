@@ -1,8 +1,9 @@
 //! Rigid-body dynamics of a serial arm: free functions over an immutable [`crate::Arm`].
 //!
-//! Sweeps run in joint frames, so that each joint rotates about z and precision does not depend on
-//! how far the wrist is from the base. Accelerations are classical (of the frame's origin), and
-//! gravity enters as an upward acceleration of the base.
+//! `aba`, `rnea` and `coriolis` recurse in joint frames, so that each joint rotates about z and precision does not
+//! depend on how far the wrist is from the base; their accelerations are classical (of the frame's origin). `terms`,
+//! `crba` and `momentum` work in base axes about the tip, `regressor` in base axes about the last joint, with spatial
+//! accelerations. Gravity `g` enters as an acceleration `-g` of the base.
 
 mod aba;
 mod body_motion;

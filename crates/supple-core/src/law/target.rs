@@ -1,12 +1,14 @@
 //! What the law wants of the tip: reference and gains of its position, or of its pose.
 //!
 //! **Orientation.** With the rotation from the tip to its reference by `angle` about the unit vector `a`,
-//! a stiffness `K` about the base axes stores the energy `(1 - cos(angle)) a^T K a`, and its torque is the
-//! gradient: `sin(angle) K a + (1 - cos(angle)) (K a) x a`. For equal stiffness about all axes this is `K e`
+//! a stiffness `K` about the base axes stores the energy `(1 - cos(angle)) a^T K a`, and its torque on the
+//! tip is minus the gradient with respect to the tip's rotation: `sin(angle) K a + (1 - cos(angle)) (K a) x a`. For equal stiffness about all axes this is `K e`
 //! with `e = sin(angle) a = (r1 x r1o + r2 x r2o + r3 x r3o) / 2`, `ri` and `rio` the axes of the tip and of
 //! its reference (Luh, Walker and Paul, "Resolved-acceleration control of mechanical manipulators", 1980);
-//! for other stiffness `K e` has no potential, and going round a loop could put energy into the arm. Beyond
-//! 90 degrees the torque weakens, at 180 degrees it vanishes.
+//! for other stiffness `K e` has no potential, and moving the tip round a closed path could put energy into the arm.
+//! For equal stiffness the torque weakens beyond 90 degrees and vanishes at 180; otherwise `2 (K a) x a` is left there.
+//!
+//! `Xo` is the reference of the tip, `X` the tip, `K` and `B` stiffness and damping, as in the paper.
 
 use crate::config::Gains;
 use crate::math::linalg::symmetric_eigenvalues;

@@ -1,6 +1,6 @@
 //! Sent by the plant to the controller once per cycle.
 
-use super::shared::{Drives, MAX_DOF, MessageError, expect_dof, padded};
+use super::common::{Drives, MAX_DOF, MessageError, expect_dof, padded};
 use iceoryx2::prelude::ZeroCopySend;
 use supple_core::Input;
 use supple_core::controller::Request;

@@ -1,18 +1,19 @@
 //! The messages between the processes: plain old data of fixed size and layout.
 //!
-//! Values are in SI units, arrays have [`MAX_DOF`] entries and are zero beyond the arm's joints, flags are bytes, kinds
-//! are the codes of [`supple_core::codes`]. There is no padding, so no uninitialised byte is shared. The name of a type
-//! carries its version: a change of meaning or layout is a new version, and a peer of another version is refused.
+//! Values are in SI units, times as integers in ns (`_ns`); arrays over the joints have [`MAX_DOF`] entries and are zero
+//! beyond the arm's joints; flags are bytes, kinds are the codes of [`supple_core::codes`]. There is no padding, so no
+//! uninitialised byte is shared. The type name in shared memory (`supple.ArmState.v4`) carries a version: a change of
+//! meaning or layout is a new version, and a peer of another version is refused.
 
 mod arm_state;
+mod common;
 mod operator;
-mod shared;
 mod telemetry;
 mod text;
 mod torque_command;
 mod wake_request;
 
-pub use shared::{Drives, MAX_DOF, MessageError};
+pub use common::{Drives, MAX_DOF, MessageError};
 
 pub use arm_state::{ArmState, PlantReport};
 pub use operator::{OperatorReply, OperatorRequest, Outcome};

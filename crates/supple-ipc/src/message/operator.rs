@@ -1,7 +1,7 @@
 //! Operator requests and the controller's replies.
 
 use super::Text;
-use super::shared::{MessageError, expect_dof};
+use super::common::{MessageError, expect_dof};
 use iceoryx2::prelude::ZeroCopySend;
 use supple_core::codes::{self, RequestCode, VALUES, request_kind};
 use supple_core::controller::{Mode, Request};

@@ -1,7 +1,7 @@
 //! Telemetry of one cycle of the controller: for logs, status lines and people.
 
 use super::ArmState;
-use super::shared::MAX_DOF;
+use super::common::MAX_DOF;
 use iceoryx2::prelude::ZeroCopySend;
 use supple_core::controller::CycleRecord;
 use supple_core::{Input, Output};

@@ -1,6 +1,6 @@
 //! Sent by the controller to the plant: the answer to one arm state.
 
-use super::shared::{Drives, MAX_DOF, MessageError, expect_dof, first_values, padded};
+use super::common::{Drives, MAX_DOF, MessageError, expect_dof, first_values, padded};
 use iceoryx2::prelude::ZeroCopySend;
 use supple_core::codes;
 use supple_core::controller::Mode;

@@ -1,6 +1,6 @@
 //! The drives' bus: `[bus]`, checked against the chain.
 
-use super::counts::wrong_count;
+use super::entry_count::wrong_count;
 use super::joints::JointResolved;
 use crate::bus_settings::{BusFormat, BusKind, BusMotorSettings, BusSettings};
 use crate::error::{ModelError, Reporter};

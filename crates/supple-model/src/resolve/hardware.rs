@@ -1,6 +1,6 @@
 //! Motors, transmission and tool.
 
-use super::counts::wrong_count;
+use super::entry_count::wrong_count;
 use super::joints::JointResolved;
 use crate::error::{ModelError, Reporter};
 use crate::settings::{MotorSettings, Settings};

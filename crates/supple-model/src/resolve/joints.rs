@@ -1,6 +1,6 @@
 //! Moving joints: limits from both files, everything else from the TOML.
 
-use super::counts::wrong_count;
+use super::entry_count::wrong_count;
 use crate::error::{ModelError, Reporter};
 use crate::settings::{HeldSettings, JointSettings, Settings};
 use crate::tree::Chain;

@@ -2,7 +2,7 @@
 //! chain order.
 
 mod bus;
-mod counts;
+mod entry_count;
 mod hardware;
 mod joints;
 

@@ -6,7 +6,7 @@ use crate::contact::{Bristle, Contact, Material};
 use crate::scene::{Layer, Scene, SceneError};
 use rapier3d_f64::dynamics::{MassProperties, RigidBody, RigidBodyBuilder, RigidBodyHandle};
 use rapier3d_f64::geometry::{Ball, ColliderBuilder, SharedShape};
-use rapier3d_f64::math as glam;
+use rapier3d_f64::math as engine_math;
 use rapier3d_f64::parry::query;
 use rapier3d_f64::pipeline::PhysicsWorld;
 use supple_core::Pose;
@@ -47,6 +47,7 @@ pub struct Surface {
     body_from_surface: Pose,
     pub body: RigidBodyHandle,
     pub material: Material,
+    /// Tangential friction state of the tip on this surface.
     pub bristle: Bristle,
 }
 
@@ -61,9 +62,10 @@ impl Surface {
 
     /// Contact state of the spherical tip, if it penetrates the surface.
     pub fn contact(&self, body: &RigidBody, ball: &Ball, tip: &TipMotion) -> Option<Contact> {
-        let tip_pose = glam::Pose::from_translation(to_glam_vector(&tip.center_m));
+        let tip_pose = engine_math::Pose::from_translation(to_glam_vector(&tip.center_m));
         let surface_pose = *body.position() * to_glam_pose(&self.body_from_surface);
-        // The surface must be the first argument: parry mirrors a half-space in second place.
+        // The surface must be the first argument: with a half-space in second place parry does not
+        // invert the relative pose, and returns a wrong contact.
         let found = query::contact(&surface_pose, &*self.shape, &tip_pose, ball, 0.0);
         let found = found.ok().flatten()?;
         let depth_m = -found.dist;
@@ -91,7 +93,7 @@ pub fn insert_scene(physics: &mut PhysicsWorld, scene: &Scene) -> Result<Vec<Sur
     if let Some(ground) = &scene.ground {
         let pose = Pose::from_translation(Vector3::new(0.0, 0.0, ground.height_m));
         let body = physics.insert_body(RigidBodyBuilder::fixed().pose(to_glam_pose(&pose)));
-        let shape = SharedShape::halfspace(glam::Vector::Z);
+        let shape = SharedShape::halfspace(engine_math::Vector::Z);
         let what = ("ground", ObjectKind::Ground, Vector3::zeros());
         surfaces.add(what, shape, body, Pose::IDENTITY, &ground.material)?;
     }
@@ -105,7 +107,7 @@ pub fn insert_scene(physics: &mut PhysicsWorld, scene: &Scene) -> Result<Vec<Sur
         let size = Vector3::from(block.size_m);
         let square = size.component_mul(&size);
         let inertia = (Vector3::repeat(square.sum()) - square) * (block.mass_kg / 12.0);
-        let zero = glam::Vector::ZERO;
+        let zero = engine_math::Vector::ZERO;
         let properties = MassProperties::new(zero, block.mass_kg, to_glam_vector(&inertia));
         let builder = RigidBodyBuilder::dynamic()
             .pose(to_glam_pose(&block.pose()))
@@ -115,7 +117,7 @@ pub fn insert_scene(physics: &mut PhysicsWorld, scene: &Scene) -> Result<Vec<Sur
         let what = (block.name.as_str(), ObjectKind::FreeBox, size);
         surfaces.add_cuboid(what, body, &block.material, block.layer.as_ref())?;
     }
-    // The engine's contacts act between scene objects only, and some of these must move.
+    // The engine's own contacts act between scene objects alone, never on the tip: without a free box none is needed.
     if !scene.free_boxes.is_empty() {
         for surface in &surfaces.list {
             let collider = ColliderBuilder::new(surface.shape.clone())

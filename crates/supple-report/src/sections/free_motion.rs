@@ -1,7 +1,7 @@
 //! Free motion: figures 3 and 4, the arc, the perturbed models, and equation (3.6) exactly as printed.
 
 use super::row::{Row, Section, quadrants_with_models, row};
-use crate::table::plants;
+use crate::table::{plants, worst};
 use crate::units::{mm, newton_metres, seconds};
 use supple_experiment::JointTorque;
 use supple_experiment::metrics::median;
@@ -51,8 +51,11 @@ fn realistic(summary: &Summary) -> Vec<Row> {
     };
     let (_, imperfect) = plants(summary);
     let errors = |errors: &[f64]| {
-        let worst = errors.iter().copied().fold(0.0, f64::max);
-        format!("{}, {}", mm(median(errors).unwrap_or(f64::NAN)), mm(worst))
+        format!(
+            "{}, {}",
+            mm(median(errors).unwrap_or(f64::NAN)),
+            mm(worst(errors))
+        )
     };
     let of = format!(
         "{imperfect}, calibrated and learning, {} seeds",
@@ -176,11 +179,7 @@ pub(super) fn arc(summary: &Summary) -> Section {
 }
 
 pub(super) fn perturbed_models(summary: &Summary) -> Section {
-    let worst = summary
-        .perturbed_rms_m
-        .iter()
-        .copied()
-        .fold(f64::NAN, f64::max);
+    let worst_m = worst(&summary.perturbed_rms_m);
     let exact = &summary.sinusoid_exact_model;
     Section {
         figure: "perturbed_models",
@@ -201,7 +200,7 @@ pub(super) fn perturbed_models(summary: &Summary) -> Section {
                 format!(
                     "{}, {}",
                     mm(median(&summary.perturbed_rms_m).unwrap_or(f64::NAN)),
-                    mm(worst)
+                    mm(worst_m)
                 ),
             ),
             row(

@@ -1,5 +1,5 @@
-//! `supple doctor`: checks whether this machine can run the arm in real time, and prints a remedy for each failed
-//! check.
+//! `supple doctor`: checks whether this machine can run the arm in real time, and prints a remedy for each check
+//! that did not pass.
 //!
 //! Read-only: it changes, writes and sends nothing. To look for the Python package it runs the interpreter.
 

@@ -18,7 +18,7 @@ const OLDEST: (u32, u32) = (3, 11);
 /// Checks the interpreter of this name. Nothing but the package itself needs it, so that nothing of it fails.
 pub fn check(interpreter: &str) -> Check {
     let ran = Command::new(interpreter)
-        .args(["-c", SCRIPT])
+        .args(["-B", "-c", SCRIPT])
         .stdin(Stdio::null())
         .output();
     let Ok(output) = ran else {

@@ -13,8 +13,9 @@ use supple_damiao::special::Special;
 pub const MS: u64 = 1_000_000;
 /// Tries of a question.
 const TRIES: u32 = 3;
-/// Deadline of a reply, and time between the tries after a silence \[ns\].
+/// Deadline of a reply \[ns\].
 const REPLY_NS: u64 = 5 * MS;
+/// Pause before a feedback request or a special frame is sent again \[ns\]; requests of registers are repeated at once.
 const RETRY_NS: u64 = 100 * MS;
 
 /// The host's end of the bus during start-up.
@@ -23,7 +24,7 @@ pub struct Host<'a, B> {
     pub bus: &'a mut B,
     /// Format of the frames.
     pub format: FrameFormat,
-    /// Called repeatedly; `true` ends the start-up.
+    /// Called after each pause; `true` ends the start-up.
     pub stop: &'a dyn Fn() -> bool,
 }
 
@@ -34,7 +35,7 @@ struct ReceivedFrame {
 }
 
 impl<B: Bus> Host<'_, B> {
-    /// Discards what other nodes send for this time.
+    /// Receives and drops all frames for this time.
     ///
     /// # Errors
     /// If the bus fails, or a shutdown is requested.
@@ -50,7 +51,8 @@ impl<B: Bus> Host<'_, B> {
     /// The feedback of a motor, without a command.
     ///
     /// # Errors
-    /// The [`Problem`] of a motor that does not answer, or not as expected; in `Err` if the bus fails.
+    /// Outer: the bus fails, or a shutdown is requested. Inner: the [`Problem`] of a motor that does not answer, or not as
+    /// expected.
     pub fn feedback(
         &mut self,
         id: u8,
@@ -59,7 +61,7 @@ impl<B: Bus> Host<'_, B> {
         self.ask(id, reply_id, &register::ask_feedback(id))
     }
 
-    /// Sends a special frame and returns the feedback to it.
+    /// Sends a special frame (enable, disable, clear an error) and returns the feedback to it.
     ///
     /// # Errors
     /// As [`Host::feedback`].
@@ -87,7 +89,9 @@ impl<B: Bus> Host<'_, B> {
             let until_ns = self.bus.now_ns() + REPLY_NS;
             let mut found: Option<Feedback> = None;
             while let Some(received) = self.next(until_ns)? {
-                if received.fd != matches!(self.format, FrameFormat::Fd { .. }) {
+                if received.frame.id() == reply_id
+                    && received.fd != matches!(self.format, FrameFormat::Fd { .. })
+                {
                     return Ok(Err(Problem::Format {
                         found_fd: received.fd,
                     }));
@@ -100,9 +104,9 @@ impl<B: Bus> Host<'_, B> {
                     continue;
                 }
                 match Feedback::of_motor(&received.frame, id) {
-                    Ok(_) if found.is_some() => return Ok(Err(Problem::TwoAnswers)),
+                    _ if found.is_some() => return Ok(Err(Problem::TwoAnswers)),
                     Ok(feedback) => found = Some(feedback),
-                    Err(_) => return Ok(Err(Problem::TwoAnswers)),
+                    Err(error) => return Ok(Err(Problem::Reply(error))),
                 }
             }
             if let Some(feedback) = found {
@@ -126,7 +130,8 @@ impl<B: Bus> Host<'_, B> {
         self.register(id, reply_id, &question, Operation::Read, of)
     }
 
-    /// Writes a register in RAM; `None` if the motor does not answer. The caller reads it back.
+    /// Writes a register in RAM; `None` if the motor does not answer, or the register cannot be written. The caller reads
+    /// it back.
     ///
     /// # Errors
     /// If the bus fails.

@@ -8,7 +8,7 @@ use supple_core::controller::Request;
 use supple_core::math::Vector3;
 use supple_core::{Config, Input, Output, State, Vector, step};
 
-/// Inputs of a run through the modes, with a fault.
+/// Inputs of a run through six modes: idle, gravity hold, move, probe, a fault, track.
 fn script<const N: usize>(config: Config<N>) -> Vec<Input<N>> {
     let mut rig = Rig::new(config, bent());
     let mut inputs = Vec::new();
@@ -32,9 +32,11 @@ fn script<const N: usize>(config: Config<N>) -> Vec<Input<N>> {
             1001 => Some(rig.hold_tip_request()),
             _ => None,
         };
+        // A lost reply of an encoder, which the estimator bridges.
         if k % 97 == 3 {
             input.position_rad[1] = None;
         }
+        // A force of the optional sensor that is not finite: the fault.
         if k == 900 {
             input.tip_force_n = Some(Vector3::repeat(f64::NAN));
         }
@@ -44,7 +46,8 @@ fn script<const N: usize>(config: Config<N>) -> Vec<Input<N>> {
     inputs
 }
 
-/// Every number of an output, bit for bit: Debug prints floats so that they parse to the same bits.
+/// Every number of an output, bit for bit: Debug prints floats so that they parse to the same bits,
+/// NaNs apart.
 fn written<const N: usize>(output: &Output<N>) -> String {
     format!("{output:?}")
 }

@@ -10,8 +10,8 @@ pub(super) fn wrong_count(
 ) -> ModelError {
     report.invalid(
         element,
-        format!("must have one entry per moving joint, {expected}"),
+        format!("must have one entry for each joint that moves, {expected}"),
         format!("{found} entries"),
-        "count the movable joints from the root link to tip_frame, fixed ones left out",
+        "list one value for each joint that moves, from the root link to tip_frame; leave out fixed, locked, mimic and prismatic joints",
     )
 }
