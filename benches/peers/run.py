@@ -200,6 +200,23 @@ def machine():
     }
 
 
+def vendor(processor):
+    """Maker of a processor, from its name."""
+    known = ("amd", "intel", "arm", "apple")
+    return next((name for name in known if name in processor.lower()), "other")
+
+
+def keep_other_processors_results(processor):
+    """Renames results of another maker's processor, so that they stand beside the new ones."""
+    for line in (HERE / "RESULTS.md").read_text().splitlines():
+        if line.startswith("- processor: ") and vendor(line) != vendor(processor):
+            for name in ("RESULTS.md", "results.json", "growth.svg"):
+                path = HERE / name
+                kept = path.rename(path.with_stem(f"{path.stem}-{vendor(line)}"))
+                if kept.suffix == ".md":
+                    kept.write_text(kept.read_text().replace("growth.svg", f"growth-{vendor(line)}.svg"))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--folder", type=pathlib.Path, required=True)
@@ -241,6 +258,7 @@ def main():
     require_quiet(after - 1.0, options.anyway)
     loads = f"{before:.2f} before, {after:.2f} after, which counts this benchmark as 1"
     described = {**machine(), "load average": loads}
+    keep_other_processors_results(described["processor"])
     report.write(HERE, described, arms, differences, growth, options.rounds)
     print(f"written: {HERE / 'RESULTS.md'}, results.json, growth.svg")
 

@@ -101,7 +101,11 @@ fn errors_in_a_toml_are_rejected() {
             (
                 "home_rad = [0.0, 0.5, 0.2]",
                 "home_rad = [0.0, 0.5]",
-                ["home_rad", "2 entries", "count"],
+                [
+                    "home_rad",
+                    "2 entries",
+                    "list one value for each joint that moves",
+                ],
             ),
             (
                 "home_rad = [0.0, 0.5, 0.2]",
@@ -193,12 +197,12 @@ fn errors_in_a_toml_are_rejected() {
             (
                 "[[0.1, 0.0, 0.0], ",
                 "[",
-                ["[motors] joint_from_motor", "2 entries", "count"],
+                ["[motors] joint_from_motor", "2 entries", "list one value"],
             ),
             (
                 "[0.1, 0.0, 0.0]",
                 "[0.1, 0.0]",
-                ["joint_from_motor[0]", "2 entries", "count"],
+                ["joint_from_motor[0]", "2 entries", "list one value"],
             ),
             (
                 "[0.1, 0.0, 0.0]",
@@ -213,7 +217,7 @@ fn errors_in_a_toml_are_rejected() {
             (
                 "torque_nm = [5.0, 2.0, 2.0]",
                 "torque_nm = [5.0, 2.0]",
-                ["[motors] torque_nm", "2 entries", "count"],
+                ["[motors] torque_nm", "2 entries", "list one value"],
             ),
             (
                 "torque_nm = [5.0, 2.0, 2.0]",
