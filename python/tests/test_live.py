@@ -111,13 +111,14 @@ def test_a_model_comes_without_errors():
 
 def test_a_late_set_point_starts_the_estimate_of_the_velocity_anew(system):
     start = system.state.tip_position_m
-    with system.set_points(100.0, lead_s=0.05) as points:
-        for k in range(3):
-            points.send(start + along_y(1e-3 * k))
+    with system.set_points(100.0, lead_s=0.2) as points:
+        for _ in range(3):
+            points.send(start)
         system.wait(1.0)
-        points.send(start + along_y(0.003), pace=False)
-        points.send(start + along_y(0.004), pace=False)
-        points.finish()
+        # Ten milliseconds after the last point this would be 0.75 m/s; it is passed 0.2 s from now, at rest.
+        points.send(start + along_y(0.005), pace=False)
+        state = points.finish()
+    np.testing.assert_allclose(state.reference_position_m, start + along_y(0.005), atol=1e-9)
 
 
 def test_gains_change_along_a_ramp(system):
@@ -134,16 +135,20 @@ def rotation(vector):
 
 
 @pytest.fixture
-def pose_system():
-    system = supple.simulated(supple.Arm.load("openarm"))
+def pose_system(tmp_path):
+    arm = supple.Arm.load("wam7")
+    active = "".join(line for line in arm.toml.splitlines(keepends=True) if not line.startswith("held"))
+    (tmp_path / "arm.toml").write_text(active)
+    (tmp_path / "arm.urdf").write_text(arm.urdf)
+    system = supple.simulated(supple.Arm.load(tmp_path))
     system.turn([0.0, 0.0, 1.0], 0.0, 0.1)
     assert system.state.mode == "track_pose"
     return system
 
 
 def test_the_tip_turns_while_its_position_stays(pose_system):
-    pose_system.gains(stiffness_n_per_m=200.0, damping_n_s_per_m=20.0)
-    pose_system.rotational_gains(5.0, 0.2)
+    pose_system.gains(stiffness_n_per_m=100.0, damping_n_s_per_m=8.0)
+    pose_system.rotational_gains(2.0, 0.04)
     pose_system.wait(1.0)
     before = pose_system.state
     after = pose_system.turn([0.0, 0.0, 2.0], 0.2, 2.0) and pose_system.wait(1.0)

@@ -401,7 +401,8 @@ class System:
         values : array_like
             Numbers of the request, in the order that the log's ``ControllerState`` lists.
         trajectory : str, optional
-            Of a request ``"track"`` or ``"track_pose"``: ``"hold"``, ``"line"``, ``"sinusoid"``, ``"arc"``, ``"quadrant"``, ``"probe"``.
+            Of a request ``"track"`` or ``"track_pose"``: ``"hold"``, ``"line"``, ``"sinusoid"``, ``"arc"``,
+            ``"quadrant"``, ``"probe"``.
         at_cycle : int, optional
             Cycle in which it takes effect. Default: the next one.
 
@@ -496,10 +497,13 @@ class System:
         ramp_s : float
             Time of the ramp (s).
         """
-        if axes != "base" or np.ndim(stiffness_n_per_m) == 2 or np.ndim(damping_n_s_per_m) == 2:
-            stiffness = _symmetric("stiffness_n_per_m", stiffness_n_per_m)
-            damping = _symmetric("damping_n_s_per_m", damping_n_s_per_m)
-            return self.request("gain_matrices", [0.0, *stiffness, *damping, _axes_code(axes), ramp_s])
+        given = (stiffness_n_per_m, damping_n_s_per_m)
+        if axes != "base" or any(value is not None and np.ndim(value) == 2 for value in given):
+            matrices = [
+                *_symmetric("stiffness_n_per_m", stiffness_n_per_m),
+                *_symmetric("damping_n_s_per_m", damping_n_s_per_m),
+            ]
+            return self.request("gain_matrices", [0.0, *matrices, _axes_code(axes), ramp_s])
         now = self.state
         stiffness = _axes("stiffness_n_per_m", stiffness_n_per_m, now.stiffness_n_per_m)
         damping = _axes("damping_n_s_per_m", damping_n_s_per_m, now.damping_n_s_per_m)

@@ -719,7 +719,8 @@ class Connection:
 
     def read(self, received: int) -> dict[str, Any]:
         """The cycles after the first `received`, as far as they are kept, as columns; `modes` and `faults` are lists, `first`
-        is how many cycles came before them."""
+        is how many cycles came before them.
+        """
 
     def latest(self) -> dict[str, Any]:
         """The last cycle, as columns with one row."""
