@@ -73,6 +73,7 @@ pub(super) fn motion<const N: usize>(
 }
 
 /// Checks the tracking error of the tip.
+#[inline]
 pub(super) fn tracking(limit_m: f64, error: &Vector3<f64>) -> Result<(), Fault> {
     let value_m = sqrt(error.dot(error));
     if exceeds(value_m, limit_m) {
@@ -82,6 +83,7 @@ pub(super) fn tracking(limit_m: f64, error: &Vector3<f64>) -> Result<(), Fault> 
 }
 
 /// Checks the angle between the tip and the reference of its orientation.
+#[inline]
 pub(super) fn rotation(limit_rad: f64, error: &Vector3<f64>) -> Result<(), Fault> {
     let value_rad = sqrt(error.dot(error));
     if exceeds(value_rad, limit_rad) {

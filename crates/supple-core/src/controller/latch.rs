@@ -140,6 +140,7 @@ impl Latch {
 
     /// First half of a cycle: updates the direction from the reference's `velocity` \[m/s\]. A
     /// reversal of the reference opens the latch.
+    #[inline]
     pub fn update_direction(&mut self, velocity: &Vector3<f64>, elapsed_s: f64) {
         self.since_reversal_s += elapsed_s;
         let speed = sqrt(velocity.dot(velocity));
@@ -159,6 +160,7 @@ impl Latch {
 
     /// Adds the observed force of an arm that is to stand still \[N\]: what changes of it is noise, whatever
     /// friction hides.
+    #[inline]
     pub fn observe_at_rest(
         &mut self,
         config: &ContactLatch,
@@ -172,6 +174,7 @@ impl Latch {
     }
 
     /// Second half of a cycle: compares the observed tip force with the threshold.
+    #[inline]
     pub fn update_contact(&mut self, config: &ContactLatch, evidence: &Evidence, elapsed_s: f64) {
         self.force_against_n = -evidence.force_n.dot(&self.direction);
         let reversing = self.since_reversal_s < config.reversal_s;
@@ -215,6 +218,7 @@ impl Latch {
     }
 
     /// Whether the tip follows the reference, or nothing has confirmed the contact in time.
+    #[inline]
     fn is_false(&self, config: &ContactLatch) -> bool {
         config.release_s.is_finite()
             && (self.following_s >= FOLLOWING_S

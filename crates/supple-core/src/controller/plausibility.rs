@@ -297,6 +297,7 @@ pub(super) fn joint_collision<const N: usize>(
     Ok(())
 }
 
+#[inline]
 pub(super) fn tip_collision(limit_n: f64, force_n: &Vector3<f64>) -> Result<(), Fault> {
     if force_n.dot(force_n) > limit_n * limit_n {
         return Err(Fault::TipCollision {

@@ -53,6 +53,7 @@ impl ResidualScale {
     }
 
     /// Adds a residual `x` of a cycle without contact.
+    #[inline]
     pub fn add(&mut self, x: f64, elapsed_s: f64) {
         let window_s = (self.seen_s + PRIOR_S).min(WINDOW_S);
         self.seen_s += elapsed_s;
@@ -64,6 +65,7 @@ impl ResidualScale {
     }
 
     /// Factor of the configured threshold.
+    #[inline]
     pub fn factor(&self) -> f64 {
         if self.deviations > 0.0 {
             sqrt(self.mean_square)

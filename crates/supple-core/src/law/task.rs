@@ -33,6 +33,7 @@ pub const MAX_TASK_INERTIA_KG_M2: f64 = 2.0;
 
 /// Damping of the position's inverse at the smallest singular value `sigma_m` \[1/kg\]: zero from
 /// [`SINGULAR_BELOW_M`] on, `1 / MAX_TASK_MASS_KG` at zero.
+#[inline]
 pub fn singularity_damping_per_kg(sigma_m: f64) -> f64 {
     if sigma_m >= SINGULAR_BELOW_M {
         return 0.0;
