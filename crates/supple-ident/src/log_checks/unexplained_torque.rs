@@ -8,6 +8,7 @@ use crate::columns::Column;
 use crate::error::IdentError;
 use crate::motion::Motion;
 use crate::regressor::joint_rows;
+use core::ops::Range;
 use nalgebra::DVector;
 
 /// Minimum torque of a contact, relative to the residual's robust standard deviation.
@@ -68,25 +69,20 @@ fn contacts<const N: usize>(
         let bound = (CONTACT_OVER_NOISE * usual_nm)
             .max(CONTACT_OVER_TORQUE * deviation)
             .max(1.5 * dry_nm + 3.0 * usual_nm);
-        let mut intervals_s = Vec::new();
-        let mut largest = None;
-        while let Some((at, peak)) = largest_of(&sizes).filter(|(_, peak)| *peak >= bound) {
-            let level = (3.0 * usual_nm).max(0.2 * peak);
-            let first = (0..at).rev().take_while(|&i| sizes[i] > level).last();
-            let first = first.unwrap_or(at);
-            let end = at + 1 + sizes[at + 1..].iter().take_while(|r| **r > level).count();
-            sizes[first..end].fill(0.0);
-            if (end - first) as f64 / motion.rate_hz > MAX_CONTACT_S {
-                continue;
-            }
-            let (from_s, to_s) = (motion.time_s(first), motion.time_s(end - 1));
-            largest = largest.or(Some((peak, from_s, to_s)));
-            intervals_s.push((from_s - MARGIN_S, to_s + MARGIN_S));
-        }
-        let Some((peak, from_s, to_s)) = largest else {
+        let longest = (MAX_CONTACT_S * motion.rate_hz) as usize;
+        let peaks = peaks(&mut sizes, bound, 3.0 * usual_nm);
+        let contacts: Vec<_> = peaks
+            .into_iter()
+            .filter(|(_, samples)| samples.len() <= longest)
+            .map(|(peak, samples)| {
+                let to_s = motion.time_s(samples.end - 1);
+                (peak, motion.time_s(samples.start), to_s)
+            })
+            .collect();
+        let Some(&(peak, from_s, to_s)) = contacts.first() else {
             continue;
         };
-        let others = match intervals_s.len() {
+        let others = match contacts.len() {
             1 => String::new(),
             count => format!(", and in {} other intervals", count - 1),
         };
@@ -101,16 +97,32 @@ fn contacts<const N: usize>(
             "these intervals are left out; record again without touching the arm",
         )
         .with(Consequence::Mask);
-        finding.intervals_s = intervals_s;
+        finding.intervals_s = contacts
+            .iter()
+            .map(|(_, from_s, to_s)| (from_s - MARGIN_S, to_s + MARGIN_S))
+            .collect();
         findings.push(finding);
     }
     findings
 }
 
-/// The largest value with its index; `None` without any.
-fn largest_of(values: &[f64]) -> Option<(usize, f64)> {
-    let values = values.iter().copied().enumerate();
-    values.max_by(|a, b| a.1.total_cmp(&b.1))
+/// Peaks of at least `bound`, largest first, each with the samples around it above `level` and above a fifth of it. The
+/// values of these samples are set to zero.
+fn peaks(sizes: &mut [f64], bound: f64, level: f64) -> Vec<(f64, Range<usize>)> {
+    let mut found = Vec::new();
+    while let Some((at, &peak)) = sizes.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)) {
+        if peak <= 0.0 || peak < bound {
+            break;
+        }
+        let level = level.max(0.2 * peak);
+        let before = sizes[..at].iter().rev().take_while(|size| **size > level);
+        let first = at - before.count();
+        let after = sizes[at + 1..].iter().take_while(|size| **size > level);
+        let end = at + 1 + after.count();
+        sizes[first..end].fill(0.0);
+        found.push((peak, first..end));
+    }
+    found
 }
 
 /// Offsets of more than 1.5 times the dry friction: in one direction the joint would be driven by its friction.
@@ -143,4 +155,20 @@ fn offsets<const N: usize>(
         }
     }
     findings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::peaks;
+
+    #[test]
+    fn every_peak_is_found_with_the_samples_around_it() {
+        let mut sizes = [0.1, 0.1, 2.0, 5.0, 2.0, 0.1, 0.1, 3.0, 3.5, 0.1];
+        assert_eq!(peaks(&mut sizes, 1.0, 0.3), [(5.0, 2..5), (3.5, 7..9)]);
+    }
+
+    #[test]
+    fn a_residual_of_zero_has_no_peak() {
+        assert_eq!(peaks(&mut [0.0; 5], 0.0, 0.0), []);
+    }
 }
