@@ -4,7 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 PLAIN=(fmt clippy test doctest doc)
-FULL=(deny advisories page python package ur10e instructions fused edits cycles fuzz cortex-m socketcan services)
+FULL=(deny advisories page python package impact ur10e instructions fused edits cycles fuzz cortex-m socketcan services)
 CARGO_DENY_VERSION=0.20.2
 CARGO_FUZZ_VERSION=0.13.2
 GUNGRAUN_VERSION=0.20.0
@@ -107,6 +107,12 @@ step_package() {
         "$bin/python" -m mypy.stubtest supple --mypy-config-file pyproject.toml
         "$bin/python" -m pytest
     )
+}
+
+# impact: an impact by MuJoCo is what the plant is tested against; installs MuJoCo
+step_impact() {
+    virtual_environment impact crates/supple-plant/tests/requirements.txt
+    "$WORK/impact/bin/python" crates/supple-plant/tests/impact_oracle.py
 }
 
 # site: the site of the documentation without a warning, its commands, figures and notebooks; uses what `package` installed, installs mkdocs and Jupyter

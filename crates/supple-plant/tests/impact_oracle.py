@@ -1,14 +1,26 @@
 """An impact of the tests' arm by MuJoCo, driven by the same force law.
 
-Prints the constants that `contact.rs` holds the plant against. Needs `mujoco` and `numpy`
-(written with MuJoCo 4.0.0); not run by the tests.
+    impact_oracle.py [--write]
+
+Compares with `impact_mujoco.json`, against which `contact.rs` tests the plant, and ends with 1 if MuJoCo now gives
+something else; `--write` replaces the file. `./ci.sh impact` runs it with the packages of `requirements.txt`.
 
 The arm is the one of `common/mod.rs`: four joints, Barrett's inertias and rotors, a 0.3 kg ball as tool.
 Gravity is compensated, the tip comes straight down at 0.04 m/s on a frictionless surface at z = 0.
 """
 
+import argparse
+import json
+import pathlib
+import sys
+
 import mujoco
 import numpy as np
+
+FILE = pathlib.Path(__file__).with_name("impact_mujoco.json")
+# Relative: far less than the bounds of `contact.rs`, more than the rounding of another processor.
+TOLERANCE = 1e-6
+STEP_S = 1e-5
 
 RADIUS, STIFFNESS, DISSIPATION = 0.02, 1.4e8, 40.0
 HALF = np.pi / 2
@@ -112,7 +124,24 @@ def impact(step):
     return peak, impulse, speed
 
 
+def main():
+    parser = argparse.ArgumentParser(description="An impact by MuJoCo, beside that of impact_mujoco.json")
+    parser.add_argument("--write", action="store_true", help=f"write {FILE.name}")
+    write = parser.parse_args().write
+    names = ("peak_n", "impulse_newton_s", "rebound_m_per_s")
+    found = dict(zip(names, impact(STEP_S)))
+    if write:
+        FILE.write_text(json.dumps({"step_s": STEP_S, "mujoco": mujoco.__version__, **found}, indent=2) + "\n")
+    expected = json.loads(FILE.read_text())
+    print(f"MuJoCo {mujoco.__version__}; {FILE.name} is of {expected['mujoco']}")
+    differs = False
+    for name in names:
+        relative = abs(found[name] / expected[name] - 1.0)
+        differs |= not relative <= TOLERANCE
+        print(f"{name}: {found[name]:.7f}, in the file {expected[name]:.7f}, relative difference {relative:.1e}")
+    if differs:
+        sys.exit(f"differs by more than {TOLERANCE}: if MuJoCo is right, run this with --write")
+
+
 if __name__ == "__main__":
-    for step in (2e-5, 1e-5):
-        peak, impulse, speed = impact(step)
-        print(f"step {step:g} s: peak {peak:.4f} N, impulse {impulse:.7f} N s, rebound {speed:.7f} m/s")
+    main()
