@@ -10,6 +10,9 @@ use supple_model::{Description, IdentifiedModel, ModelError};
 /// Collision threshold over the greatest residual of free motion. Motions that the logs do not contain, faster or with
 /// the arm stretched out, have greater residuals.
 pub const RESIDUAL_MARGIN: f64 = 3.0;
+/// Part of the collision threshold over the breakaway torque: where a joint reverses, the dry friction of the model and the
+/// true one may have opposite signs.
+const REVERSAL_MARGIN: f64 = 2.0;
 
 /// Error of saving a fit.
 #[derive(Debug, thiserror::Error)]
@@ -44,16 +47,16 @@ impl<const N: usize> Fit<N> {
     }
 
     /// Collision thresholds for the modes with stiff joint loops, from the residual of the model on held-out motions
-    /// \[N m\]: three times the greatest residual of the joint, and the breakaway torque, which may act
-    /// either way while the joint stands still. At most the joint's present threshold; `None` for a joint that did not
-    /// move.
+    /// \[N m\]: three times the greatest residual of the joint, and twice its breakaway torque. At most the joint's present
+    /// threshold; `None` for a joint that did not move.
     pub fn move_collision_nm(&self, held_out: &[Validation], of: &Config<N>) -> [Option<f64>; N] {
         let friction = self.friction_with(&of.friction);
         let mut thresholds = [None; N];
         for (row, joint) in self.columns.moving().iter().enumerate() {
             let peaks = held_out.iter().map(|log| log.peak_nm[row]);
             let peak_nm = peaks.fold(0.0, f64::max);
-            let threshold_nm = RESIDUAL_MARGIN * peak_nm + friction[*joint].breakaway_nm;
+            let threshold_nm =
+                RESIDUAL_MARGIN * peak_nm + REVERSAL_MARGIN * friction[*joint].breakaway_nm;
             let present_nm = of.collision.move_joint_torque_nm[*joint];
             thresholds[*joint] = Some(threshold_nm.min(present_nm));
         }
