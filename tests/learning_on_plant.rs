@@ -94,42 +94,61 @@ fn learning_does_no_harm_to_a_good_model() {
     );
 }
 
-fn probing(learned: Option<LearnedTerms<4>>, stiffness_n_per_m: f64) -> Stroke {
+/// Heights of the block's face beside that of the experiment \[m\]: every `step`-th of 13.
+fn heights_m(step: usize) -> impl Iterator<Item = f64> {
+    (-6..=6).step_by(step).map(|k| f64::from(k) * 1e-4)
+}
+
+/// The median stroke on a block whose face is `higher_m` higher.
+fn probing(learned: Option<LearnedTerms<4>>, stiffness_n_per_m: f64, higher_m: f64) -> Stroke {
     let (probe, duration_s) = scenario::probe(wam4().tip_radius_m());
     let mut plan = plan(Deviation::None, (Trajectory::Probe(probe), duration_s));
     plan.learning = learned.is_some();
     plan.config.learned = learned.unwrap_or(plan.config.learned);
     plan.config.law.gains = scenario::gains(stiffness_n_per_m);
     plan.plant.scene = scenario::block();
+    for block in &mut plan.plant.scene.fixed_blocks {
+        block.center_m[2] += higher_m;
+    }
     median_stroke(&strokes(&plan).expect("probing runs"))
 }
 
 /// Peak, impact and force while pressing of probing with learning on, after a sinusoid has taught, are those without.
-/// The arm arrives at another speed where its free motion differs: an impact is compared by its impulse over the
-/// speed. The whole impulse at 5 N/m depends on when the tip arrives and leaves, and on 0.02 N m of gravity.
+/// The arm arrives at another speed where its free motion differs: an impact is compared by its impulse over the speed.
+///
+/// Means over blocks of several heights are compared. With which force a single soft stroke ends is chance: from 0.02 to
+/// 0.22 N where the spring asks for 0.2 N, without learning too, as the face is moved by tenths of a millimetre.
 #[test]
 fn contact_is_the_same_with_learning() {
     let (_, terms) = track(&plan(Deviation::None, sinusoid()));
-    for (stiffness_n_per_m, impulse_share) in [(5.0, 0.08), (125.0, 0.05)] {
-        let (a, b) = (
-            probing(None, stiffness_n_per_m),
-            probing(Some(terms), stiffness_n_per_m),
-        );
-        println!("{stiffness_n_per_m} N/m: {a:?}\n{b:?}");
-        let same = |part: &dyn Fn(&Stroke) -> f64, share: f64, absolute: f64| {
-            let (a, b) = (part(&a), part(&b));
+    for (stiffness_n_per_m, step) in [(5.0, 1), (125.0, 6)] {
+        let pairs: Vec<(Stroke, Stroke)> = heights_m(step)
+            .map(|higher_m| {
+                (
+                    probing(None, stiffness_n_per_m, higher_m),
+                    probing(Some(terms), stiffness_n_per_m, higher_m),
+                )
+            })
+            .collect();
+        let same = |name: &str, part: &dyn Fn(&Stroke) -> f64, share: f64, absolute: f64| {
+            let count = pairs.len() as f64;
+            let a = pairs.iter().map(|(a, _)| part(a)).sum::<f64>() / count;
+            let b = pairs.iter().map(|(_, b)| part(b)).sum::<f64>() / count;
+            println!("{stiffness_n_per_m} N/m, {name}: {a} without, {b} with");
             assert!(
                 (a - b).abs() <= share * a.abs() + absolute,
-                "{stiffness_n_per_m} N/m: {a} without, {b} with"
+                "{stiffness_n_per_m} N/m, {name}: {a} without, {b} with"
             );
         };
-        same(&|s| s.peak_filtered_n, 0.05, 0.0);
+        same("peak [N]", &|s| s.peak_filtered_n, 0.02, 0.0);
+        let per_speed = |s: &Stroke| s.impulse_first_50ms_newton_s / s.approach_m_per_s;
+        same("impulse over speed [kg]", &per_speed, 0.05, 0.0);
+        same("impulse [N s]", &|s| s.impulse_newton_s, 0.05, 0.0);
         same(
-            &|s| s.impulse_first_50ms_newton_s / s.approach_m_per_s,
+            "force while pressing [N]",
+            &|s| s.pressing_force_n,
             0.05,
-            0.0,
+            0.05,
         );
-        same(&|s| s.impulse_newton_s, impulse_share, 0.0);
-        same(&|s| s.pressing_force_n, 0.05, 0.05);
     }
 }

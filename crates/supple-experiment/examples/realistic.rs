@@ -78,7 +78,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         values.sort_by(f64::total_cmp);
         values
     };
-    let median: Vec<f64> = (0..columns).map(|c| sorted(c)[rows.len() / 2]).collect();
+    let median: Vec<f64> = (0..columns)
+        .filter_map(|c| supple_experiment::metrics::median(&sorted(c)))
+        .collect();
     let worst: Vec<f64> = (0..columns).map(|c| sorted(c)[rows.len() - 1]).collect();
     println!("median: {}\nworst: {}", in_mm(&median), in_mm(&worst));
     println!("{contacts} contacts");

@@ -7,27 +7,53 @@ use crate::report::Report;
 use crate::rows::Rows;
 use crate::solve::{Estimate, of_prior, solve};
 use std::collections::VecDeque;
-use supple_core::Config;
 use supple_core::controller::{CycleRecord, Request};
 use supple_core::learned::LearnedTerms;
 use supple_core::math::exp;
+use supple_core::{Config, Friction, Vector};
 
-/// Slower joints give no equations: their friction is not identifiable \[rad/s\].
-const MIN_SPEED_RAD_PER_S: f64 = 0.08;
-/// Time after a restart, a freeze or a reversal until a joint's filters have settled \[s\].
-const SETTLE_S: f64 = 0.15;
+/// When a joint gives equations: what its dry friction does in a reversal is not identifiable.
+#[derive(Clone, Copy, Debug)]
+struct SpeedGate {
+    /// Minimum speed \[rad/s\].
+    min_rad_per_s: f64,
+    /// Time at such a speed, without a reversal, until the joint's filters have settled \[s\].
+    settle_s: f64,
+}
+
+impl SpeedGate {
+    const WITHOUT_PRESLIDING: SpeedGate = SpeedGate {
+        min_rad_per_s: 0.08,
+        settle_s: 0.15,
+    };
+    /// Where the travel of a reversal is known, the equations follow it.
+    const WITH_PRESLIDING: SpeedGate = SpeedGate {
+        min_rad_per_s: 0.02,
+        settle_s: 0.05,
+    };
+
+    fn of(friction: &Friction) -> SpeedGate {
+        if friction.presliding_rad > 0.0 {
+            SpeedGate::WITH_PRESLIDING
+        } else {
+            SpeedGate::WITHOUT_PRESLIDING
+        }
+    }
+}
+
 /// Time between samples \[s\].
 const SAMPLE_S: f64 = 0.01;
 /// Time over which errors of the model are correlated: one sample of this time is independent \[s\].
-const CORRELATION_S: f64 = 1.0;
+const CORRELATION_S: f64 = 0.2;
 /// Samples are collected, judged and used by intervals of this length \[s\].
 const INTERVAL_S: f64 = 0.25;
 /// Intervals for which samples wait: a freeze meanwhile discards them.
 const WAITING: usize = 2;
 /// Time after a freeze in which no samples are collected \[s\].
 const AFTER_FREEZE_S: f64 = 0.5;
-/// Time constant of forgetting, in time of motion \[s\].
-const FORGET_S: f64 = 60.0;
+/// Time constant of forgetting, in time of motion \[s\]. A longer memory gives errors that no unknown explains more weight
+/// than the prior.
+const FORGET_S: f64 = 30.0;
 /// An interval is disturbed if its error is greater than this multiple of its standard deviation.
 const DISTURBED: f64 = 4.0;
 /// Time of unexplained torque in free motion after which it is taken for a change of the arm \[s\].
@@ -62,6 +88,9 @@ pub struct Learner<const N: usize> {
     /// Time since the filters of all joints, and of each joint, may be relied on \[s\].
     since_freeze_s: f64,
     since_slow_s: [f64; N],
+    /// Velocity of the cycle before \[rad/s\].
+    last_velocity_rad_per_s: Vector<N>,
+    speed_gate: [SpeedGate; N],
     cycles_to_sample: u32,
     interval_s: f64,
     collecting: Vec<Information>,
@@ -88,6 +117,8 @@ impl<const N: usize> Learner<N> {
             last_cycle: None,
             since_freeze_s: 0.0,
             since_slow_s: [0.0; N],
+            last_velocity_rad_per_s: Vector::zeros(),
+            speed_gate: config.friction.map(|friction| SpeedGate::of(&friction)),
             cycles_to_sample: 0,
             interval_s: 0.0,
             collecting: vec![Information::empty(); N],
@@ -147,10 +178,17 @@ impl<const N: usize> Learner<N> {
         }
         let rows = self.rows.cycle(record);
         self.since_freeze_s += self.period_s;
-        for (since, velocity) in self.since_slow_s.iter_mut().zip(&record.velocity_rad_per_s) {
-            let fast = velocity.abs() >= MIN_SPEED_RAD_PER_S;
-            *since = if fast { *since + self.period_s } else { 0.0 };
+        let velocity = &record.velocity_rad_per_s;
+        for (i, since) in self.since_slow_s.iter_mut().enumerate() {
+            let is_fast = velocity[i].abs() >= self.speed_gate[i].min_rad_per_s;
+            let reverses = velocity[i] * self.last_velocity_rad_per_s[i] < 0.0;
+            if is_fast && !reverses {
+                *since += self.period_s;
+            } else {
+                *since = 0.0;
+            }
         }
+        self.last_velocity_rad_per_s = *velocity;
         match Frozen::of_cycle(record) {
             Some(frozen) => {
                 self.frozen = Some(frozen);
@@ -185,7 +223,7 @@ impl<const N: usize> Learner<N> {
         self.cycles_to_sample = cycles.saturating_sub(1);
         let sample_s = f64::from(cycles.max(1)) * self.period_s;
         for (i, row) in rows.iter().enumerate() {
-            if self.since_slow_s[i] >= SETTLE_S {
+            if self.since_slow_s[i] >= self.speed_gate[i].settle_s {
                 let weight = sample_s / CORRELATION_S / self.prior.noise_nm[i].powi(2);
                 self.collecting[i].add(row, weight);
             }

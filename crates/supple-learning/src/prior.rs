@@ -41,9 +41,9 @@ const PRIOR_SHARE: f64 = 0.4;
 /// The same of an offset, which a payload and a tilt explain as well.
 const OFFSET_SHARE: f64 = 0.05;
 /// The same of the map's part over the angle alone.
-const MAP_TORQUE_SHARE: f64 = 0.1;
+const MAP_TORQUE_SHARE: f64 = 0.05;
 /// The same of the map's part against the motion, over the Coulomb friction.
-const MAP_DRY_SHARE: f64 = 0.1;
+const MAP_DRY_SHARE: f64 = 0.2;
 /// Standard deviation of the map's second differences over that of its coefficients: how smooth it is.
 const SMOOTHNESS: f64 = 0.5;
 /// Smallest standard deviation that counts, so that no precision is infinite.

@@ -9,7 +9,10 @@
 //! (`b` the gain that makes the first term the filtered difference of `p`). What the filtered command has beyond it is
 //! the prediction error; the columns of the unknowns pass `F` too. Before that, command and angle pass the filter whose
 //! derivative the velocity estimate is, so that angle, velocity and torque belong to the same time; the command is
-//! delayed as the drives delay it.
+//! delayed as the drives delay it. Dry friction has the direction of [`Friction::direction_after`] where the travel of a
+//! reversal is known, else that of the velocity.
+//!
+//! [`Friction::direction_after`]: supple_core::Friction::direction_after
 
 use crate::prior::unknowns::{
     ALL, COULOMB, MAP_DRY, MAP_TORQUE, MOMENT, OFFSET, PAYLOAD, SCALE, TILT, VISCOUS,
@@ -48,6 +51,8 @@ pub struct Rows<const N: usize> {
     position: [Vector<N>; 2],
     torque: [Vector<N>; 2],
     commands: VecDeque<Vector<N>>,
+    /// Direction of each joint's dry friction, -1 to 1.
+    direction: Vector<N>,
     /// `F p`, and `F[G + D - C^T qd]`, `F[tau]`.
     momentum: Vector<N>,
     model: Vector<N>,
@@ -70,6 +75,7 @@ impl<const N: usize> Rows<N> {
             position: [Vector::zeros(); 2],
             torque: [Vector::zeros(); 2],
             commands: VecDeque::new(),
+            direction: Vector::zeros(),
             momentum: Vector::zeros(),
             model: Vector::zeros(),
             command: Vector::zeros(),
@@ -108,7 +114,18 @@ impl<const N: usize> Rows<N> {
         }
         let (q, config) = (self.position[1], &self.config);
         terms(&config.arm, &q, velocity, &mut self.terms);
-        let friction = Vector::<N>::from_fn(|i, _| config.friction[i].torque_nm(velocity[i]));
+        let direction = Vector::<N>::from_fn(|i, _| {
+            let friction = &config.friction[i];
+            if friction.presliding_rad == 0.0 || first {
+                friction.direction(velocity[i])
+            } else {
+                friction.direction_after(self.direction[i], velocity[i] * config.period_s)
+            }
+        });
+        self.direction = direction;
+        let friction = Vector::<N>::from_fn(|i, _| {
+            config.friction[i].torque_in_direction_nm(velocity[i], direction[i], 1.0)
+        });
         let model = self.terms.gravity + friction - self.terms.kinetic_gradient;
         let tip_velocity = self.terms.jacobian.fixed_rows::<3>(0) * velocity;
         if first {
@@ -164,7 +181,7 @@ impl<const N: usize> Rows<N> {
         });
         (0..N)
             .map(|i| {
-                let direction = config.friction[i].direction(velocity[i]);
+                let direction = self.direction[i];
                 let lower = config.limits.position_lower_rad[i];
                 let upper = config.limits.position_upper_rad[i];
                 let map = MapWeights::new(q[i], lower, upper);

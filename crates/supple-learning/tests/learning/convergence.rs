@@ -1,6 +1,7 @@
 //! Where the motion excites them, the terms converge to the truth; they never leave their bounds.
 
 use crate::support::configs::{four, seven, three};
+use crate::support::rig::bent;
 use crate::support::size;
 use crate::world::{Truth, World, exciting, model, size_of_joint};
 use proptest::prelude::*;
@@ -8,6 +9,7 @@ use supple_core::controller::Request;
 use supple_core::dynamics::{gravity, rnea};
 use supple_core::learned::LearnedBounds;
 use supple_core::math::Vector3;
+use supple_core::trajectory::Fourier;
 use supple_core::{Arm, Config, Vector};
 
 fn truth<const N: usize>() -> impl Strategy<Value = Truth<N>> {
@@ -222,4 +224,51 @@ fn same_records_give_the_same_requests() {
     let first = run();
     assert!(first.len() >= 4, "{} requests", first.len());
     assert_eq!(first, run());
+}
+
+/// Joints that reverse again and again, slower than 0.08 rad/s.
+fn slow() -> Fourier<4> {
+    let mut series = exciting::<4>(60.0);
+    for amplitudes in series.sine_rad.iter_mut().chain(&mut series.cosine_rad) {
+        *amplitudes *= 0.1;
+    }
+    let start = series.at(0.0).position_rad - series.centre_rad;
+    series.centre_rad = bent::<4>() - start;
+    series
+}
+
+/// Slow joints teach their dry friction where the travel of a reversal is known, and nothing where it is not.
+#[test]
+fn slow_joints_teach_where_the_travel_of_a_reversal_is_known() {
+    let truth = Truth {
+        coulomb: Vector::repeat(0.2),
+        ..Truth::none()
+    };
+    for presliding_rad in [0.0, 1e-3, 4e-3] {
+        let mut config = model(four());
+        for friction in &mut config.friction {
+            friction.presliding_rad = presliding_rad;
+        }
+        let mut world = World::new(config, truth);
+        world.request(Request::Excite(slow()));
+        let output = world.run(55.0, Vector3::zeros());
+        let learned_s = world.learner.report().learned_s;
+        if presliding_rad == 0.0 {
+            assert_eq!(learned_s, [0.0; 4]);
+            continue;
+        }
+        for (joint, friction) in config.friction.iter().enumerate() {
+            let expected_nm = truth.coulomb[joint] * friction.coulomb_nm;
+            let terms = &world.learner.report().terms;
+            let map = &terms.map[joint].dry_nm;
+            let mean_nm = map.iter().sum::<f64>() / map.len() as f64;
+            let found_nm = terms.parameters.coulomb_nm[joint] + mean_nm;
+            assert!(
+                learned_s[joint] > 5.0 && (found_nm - expected_nm).abs() < 0.3 * expected_nm,
+                "travel {presliding_rad} rad, joint {joint}: {found_nm} of {expected_nm} N m after {} s, {:?}",
+                learned_s[joint],
+                output.learned
+            );
+        }
+    }
 }

@@ -108,10 +108,10 @@ fn lasting_change_is_learned_in_the_end() {
     let mut world = World::new(model(four()), Truth::none());
     world.request(Request::Excite(exciting::<4>(120.0)));
     world.run(25.0, Vector3::zeros());
-    let weight = Vector3::new(0.0, 0.0, -0.15 * 9.81);
-    let soon = world.run(5.0, weight).learned;
+    world.add_payload(0.15);
+    let soon = world.run(5.0, Vector3::zeros()).learned;
     assert!(soon.payload_kg.abs() < 0.03, "{soon:?}");
-    let late = world.run(60.0, weight).learned;
+    let late = world.run(60.0, Vector3::zeros()).learned;
     assert!((late.payload_kg - 0.15).abs() < 0.05, "{late:?}");
 }
 

@@ -112,6 +112,8 @@ pub struct World<const N: usize> {
     pub learner: Learner<N>,
     truth: Truth<N>,
     friction: [Friction; N],
+    /// Direction of each joint's dry friction, -1 to 1.
+    direction: Vector<N>,
     scheduled: VecDeque<Scheduled<N>>,
     steps: u64,
     /// Every request of the learner.
@@ -126,6 +128,7 @@ impl<const N: usize> World<N> {
             plant: Plant::at_rest(truth.arm(&config.arm), bent()),
             learner: Learner::new(&config),
             friction: truth.friction(&config.friction),
+            direction: Vector::zeros(),
             truth,
             scheduled: VecDeque::new(),
             steps: 0,
@@ -135,6 +138,12 @@ impl<const N: usize> World<N> {
         world.request(Request::GravityHold);
         world.request(Request::Learning(LearningSwitch::On));
         world
+    }
+
+    /// Adds a point mass at the tip, with its weight and its inertia.
+    pub fn add_payload(&mut self, payload_kg: f64) {
+        self.truth.payload_kg += payload_kg;
+        self.plant.arm = self.truth.arm(&self.rig.controller.config().arm);
     }
 
     #[track_caller]
@@ -163,11 +172,20 @@ impl<const N: usize> World<N> {
         self.requests.extend(news.iter().copied());
         self.scheduled.extend(news);
         let (friction, offset) = (self.friction, self.truth.offset_nm);
+        let period_s = self.rig.controller.config().period_s;
+        for (i, direction) in self.direction.iter_mut().enumerate() {
+            if friction[i].presliding_rad > 0.0 {
+                *direction = friction[i].direction_after(*direction, self.plant.qd[i] * period_s);
+            }
+        }
+        let direction = self.direction;
         let resistance = move |arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>| {
-            let friction = Vector::from_fn(|i, _| friction[i].torque_nm(qd[i]));
+            let friction = Vector::from_fn(|i, _| match friction[i].presliding_rad {
+                0.0 => friction[i].torque_nm(qd[i]),
+                _ => friction[i].torque_in_direction_nm(qd[i], direction[i], 1.0),
+            });
             push(arm, q, &force_n) - friction - offset
         };
-        let period_s = self.rig.controller.config().period_s;
         self.plant
             .advance(&output.torque_nm, resistance, period_s, 4);
         output
