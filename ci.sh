@@ -109,7 +109,7 @@ step_package() {
     )
 }
 
-# impact: an impact by MuJoCo is what the plant is tested against; installs MuJoCo
+# impact: MuJoCo still gives the impact against which the plant is tested; installs MuJoCo
 step_impact() {
     virtual_environment impact crates/supple-plant/tests/requirements.txt
     "$WORK/impact/bin/python" crates/supple-plant/tests/impact_oracle.py
