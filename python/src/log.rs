@@ -5,7 +5,7 @@ use crate::errors;
 use crate::table::Table;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use supple_core::controller::CycleRecord;
 use supple_core::record::{Cell, for_each_column};
 use supple_log::{CycleTiming, LogError, PlantTruth, Reader, Timed};
@@ -23,7 +23,7 @@ struct Columns {
 /// Reads a log: the arm, its metadata and its columns.
 #[pyfunction]
 pub fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
-    let (reader, columns) = py.detach(|| read(path)).map_err(errors::log)?;
+    let (reader, columns) = py.detach(|| read(&path)).map_err(errors::log)?;
     let about = reader.about();
     let dict = PyDict::new(py);
     let description = reader.description().map_err(errors::log)?;
@@ -40,7 +40,7 @@ pub fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
     Ok(dict)
 }
 
-fn read(path: PathBuf) -> Result<(Reader, Columns), LogError> {
+fn read(path: &Path) -> Result<(Reader, Columns), LogError> {
     let reader = Reader::open(path)?;
     let joints = reader.about().joints.len();
     let columns = with_dof!(joints, N => sized::<N>(&reader))??;

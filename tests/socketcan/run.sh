@@ -111,7 +111,7 @@ chmod +x "$root/init"
 
 start=$SECONDS
 # The exit code of the emulator does not reflect the guest's result.
-timeout 600 qemu-system-x86_64 -machine q35 -accel tcg -icount shift=0,sleep=off -m 512 \
+timeout 600 qemu-system-x86_64 -machine q35 -cpu max -accel tcg -icount shift=0,sleep=off -m 512 \
     -display none -monitor none -serial "file:$console" -net none -no-reboot \
     -kernel "$folder/kernel/vmlinuz" -initrd "$folder/initramfs" \
     -append "console=ttyS0 panic=-1 quiet" </dev/null || true

@@ -1,5 +1,5 @@
 //! The program `supple-can`.
 
 fn main() -> std::process::ExitCode {
-    supple_can::main()
+    supple_realtime::run_on_supported_processor(supple_can::main)
 }

@@ -10,7 +10,7 @@
 //! | 5 | a fault ended a run, or is latched in the running system; all results are written |
 //! | 6 | a file cannot be read or written |
 //! | 7 | a replay differs from the logged outputs |
-//! | 8 | the machine does not meet the real-time requirements |
+//! | 8 | the machine does not meet the requirements: real time, or instructions of the processor |
 //! | 9 | no model can be identified from the logs |
 //! | 10 | no system is running, one of its processes cannot start or has exited, or a motor does not fit |
 //! | 11 | the controller refused a request |
@@ -37,7 +37,7 @@ pub const CODES: &str = "Exit codes:
   5    a fault ended a run, or is latched in the running system; all results are written
   6    a file cannot be read or written
   7    a replay differs from the logged outputs
-  8    the machine does not meet the real-time requirements
+  8    the machine does not meet the requirements: real time, or instructions of the processor
   9    no model can be identified from the logs
   10   no system is running, one of its processes cannot start or has exited, or a motor does not fit
   11   the controller refused a request

@@ -1,5 +1,5 @@
 //! The program `supple-emu`.
 
 fn main() -> std::process::ExitCode {
-    supple_emu::main()
+    supple_realtime::run_on_supported_processor(supple_emu::main)
 }

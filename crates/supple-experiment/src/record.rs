@@ -51,7 +51,7 @@ impl<const N: usize> Recorder<N> {
             ..RunInfo::default()
         };
         Ok(Recorder {
-            writer: Writer::create(path, description, config, &run)?,
+            writer: Writer::create(&path, description, config, &run)?,
             period_ns: (config.period_s * 1e9).round() as u64,
         })
     }

@@ -9,7 +9,7 @@ fn main() -> ExitCode {
         eprintln!("usage: recover_log <cut.mcap> <whole.mcap>");
         return ExitCode::from(2);
     };
-    match supple_log::recover(from, to) {
+    match supple_log::recover(&from, &to) {
         Ok(recovery) => {
             println!("{recovery}");
             ExitCode::SUCCESS

@@ -110,7 +110,7 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         plausible,
         workspace,
     } = *config;
-    toml::to_string(&Stored {
+    let stored = Stored {
         period_s,
         estimator_rad_per_s,
         handover_s,
@@ -142,13 +142,16 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
                 link: arm.links()[i],
             })
             .collect(),
-    })
+    };
+    toml::to_string(&stored as &dyn erased_serde::Serialize)
 }
 
 /// # Errors
 /// Description of the problem.
 pub(crate) fn from_toml<const N: usize>(text: &str) -> Result<Config<N>, String> {
-    let stored: Stored<N> = toml::from_str(text).map_err(|error| error.to_string())?;
+    // By way of a table, whose deserializer compiles to less code for each number of joints than that of text.
+    let table: toml::Table = toml::from_str(text).map_err(|error| error.to_string())?;
+    let stored: Stored<N> = table.try_into().map_err(|error| error.to_string())?;
     let joints: [Joint; N] = stored
         .joints
         .try_into()

@@ -23,12 +23,11 @@ use std::path::Path;
 /// [`LogError::UnknownChannel`] with the existing channels; [`LogError::Format`] if its messages cannot be written
 /// as a table; [`LogError::Output`]; errors of reading.
 pub fn export_csv(
-    path: impl AsRef<Path>,
+    path: &Path,
     channel: &str,
     every: NonZeroU64,
-    out: &mut impl Write,
+    out: &mut dyn Write,
 ) -> Result<u64, LogError> {
-    let path = path.as_ref();
     let joints = &Reader::open(path)?.about().joints.clone();
     let mut scan = Scan::open(path)?;
     let mut known = BTreeSet::new();

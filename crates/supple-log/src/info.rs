@@ -86,8 +86,7 @@ pub struct FaultInfo {
 /// # Errors
 /// [`LogError::Read`]; [`LogError::Format`] where it is no log of ours; [`LogError::Incomplete`] where
 /// not even its beginning is whole.
-pub fn info(path: impl AsRef<Path>) -> Result<Info, LogError> {
-    let path = path.as_ref();
+pub fn info(path: &Path) -> Result<Info, LogError> {
     let about = Reader::open(path)?.about().clone();
     let metadata = std::fs::metadata(path).map_err(|source| LogError::Read {
         file: path.display().to_string(),

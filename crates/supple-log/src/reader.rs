@@ -55,8 +55,8 @@ impl Reader {
     /// # Errors
     /// [`LogError::Read`]; [`LogError::Format`] where it is no log of ours; [`LogError::Incomplete`]
     /// where it stops before its first step.
-    pub fn open(path: impl AsRef<Path>) -> Result<Self, LogError> {
-        let path = path.as_ref().to_owned();
+    pub fn open(path: &Path) -> Result<Self, LogError> {
+        let path = path.to_owned();
         let mut scan = Scan::open(&path)?;
         let mut about = None;
         let mut notes = BTreeMap::new();

@@ -61,8 +61,7 @@ impl fmt::Display for Recovery {
 /// # Errors
 /// [`LogError::NoCompleteChunk`], [`LogError::SameFile`]; [`LogError::Format`] if `from` is not an MCAP file;
 /// errors of reading and writing.
-pub fn recover(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Recovery, LogError> {
-    let (from, to) = (from.as_ref(), to.as_ref());
+pub fn recover(from: &Path, to: &Path) -> Result<Recovery, LogError> {
     let mut scan = Scan::open(from)?;
     let read_error = |source| LogError::Read {
         file: from.display().to_string(),

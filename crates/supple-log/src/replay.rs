@@ -54,7 +54,7 @@ pub struct Difference {
 /// [`LogError::Gap`] where steps are missing: the state after them is not known.
 /// [`LogError::Incomplete`] where the file is cut. [`LogError::Format`] where it holds a configuration
 /// or a request that this version does not have.
-pub fn replay(path: impl AsRef<Path>) -> Result<Replay, LogError> {
+pub fn replay(path: &Path) -> Result<Replay, LogError> {
     let reader = Reader::open(path)?;
     with_dof!(reader.about().joints.len(), N => run::<N>(&reader))?
 }

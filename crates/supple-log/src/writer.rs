@@ -49,14 +49,14 @@ impl<const N: usize> Writer<N> {
     /// [`LogError::Create`], [`LogError::Busy`] or [`LogError::Write`]; [`LogError::Model`] where the
     /// description has not `N` joints.
     pub fn create(
-        path: impl AsRef<Path>,
+        path: &Path,
         description: &Description,
         config: &Config<N>,
         run: &RunInfo,
     ) -> Result<Self, LogError> {
         let home = description.home::<N>()?;
         let base = base_frame(description, home.as_slice())?;
-        let mut file = LogFile::create(path.as_ref(), ".part")?;
+        let mut file = LogFile::create(path, ".part")?;
         let controller =
             crate::config::to_toml(config).map_err(|error| file.unwritable(error.to_string()))?;
         file.metadata("supple", about(description, run))?;

@@ -14,6 +14,7 @@ mod notify;
 mod options;
 mod pause;
 mod private_folder;
+mod processor;
 mod schedule;
 mod settings;
 mod spin;
@@ -30,6 +31,7 @@ pub use pause::pause;
 pub use private_folder::{
     PrivateFolderError, create_private_folder, open_private_folder, runtime_folder,
 };
+pub use processor::{ProcessorError, check_processor, run_on_supported_processor};
 pub use spin::spin_duration;
 pub use stop::{Stop, StopError, die_with_parent, ignore_file_size_and_tty_signals};
 

@@ -1,5 +1,5 @@
 //! The controller of one arm, as a process.
 
 fn main() -> std::process::ExitCode {
-    supple_rt::main()
+    supple_realtime::run_on_supported_processor(supple_rt::main)
 }

@@ -1,5 +1,5 @@
 //! A simulated arm, as a process.
 
 fn main() -> std::process::ExitCode {
-    supple_sim::main()
+    supple_realtime::run_on_supported_processor(supple_sim::main)
 }

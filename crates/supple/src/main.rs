@@ -1,5 +1,5 @@
 //! The command line.
 
 fn main() -> std::process::ExitCode {
-    supple::run()
+    supple_realtime::run_on_supported_processor(supple::run)
 }

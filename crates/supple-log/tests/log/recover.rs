@@ -134,7 +134,7 @@ fn a_truncated_file_is_read_up_to_its_last_complete_chunk() {
 fn a_complete_file_is_copied_byte_for_byte() {
     let original = original();
     let to = original.folder.path().join("copy.mcap");
-    let recovery = recover(original.folder.path().join("run.mcap"), &to).expect("complete");
+    let recovery = recover(&original.folder.path().join("run.mcap"), &to).expect("complete");
     assert_eq!(recovery.stopped, None);
     assert_eq!(recovery.kept_bytes, original.bytes.len() as u64);
     assert!(fs::read(to).expect("read") == original.bytes);
@@ -237,7 +237,7 @@ fn a_file_without_complete_chunks_is_rejected_and_no_output_is_left() {
     fs::write(&from, "not an MCAP file, whatever its name").expect("written");
     let error = recover(&from, &to).expect_err("not an MCAP file");
     assert!(matches!(error, LogError::Format { .. }), "{error}");
-    let error = recover(original.folder.path().join("missing"), &to).expect_err("missing");
+    let error = recover(&original.folder.path().join("missing"), &to).expect_err("missing");
     assert!(matches!(error, LogError::Read { .. }), "{error}");
     let error = recover(original.folder.path(), &to).expect_err("a folder");
     assert!(matches!(error, LogError::Read { .. }), "{error}");

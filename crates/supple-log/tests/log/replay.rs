@@ -117,7 +117,7 @@ fn rewrite(path: &std::path::Path, mut change: impl FnMut(u64, &mut common::Cycl
 #[test]
 fn a_log_of_the_first_format_replays() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/version_1.mcap");
-    let replay = replay(path).expect("replayed");
+    let replay = replay(std::path::Path::new(path)).expect("replayed");
     assert_eq!(replay.steps, 400);
     assert_eq!(replay.first_difference, None);
 }

@@ -195,7 +195,7 @@ fn the_same_run_gives_identical_bytes() {
 #[test]
 fn a_log_of_the_first_format_is_read() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/version_1.mcap");
-    let reader = Reader::open(path).expect("opened");
+    let reader = Reader::open(std::path::Path::new(path)).expect("opened");
     let records = reader.records::<N>().expect("four joints");
     let records: Vec<_> = records.map(|record| record.expect("whole").value).collect();
     assert_eq!(records.len(), 400);
