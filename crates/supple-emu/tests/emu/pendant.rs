@@ -115,3 +115,17 @@ fn a_line_may_arrive_in_pieces() {
     stream.read_to_string(&mut answer).expect("an answer");
     assert!(answer.contains("\"safety_mode\""), "{answer}");
 }
+
+#[test]
+fn a_line_that_is_too_long_is_refused_and_does_nothing() {
+    let arm = Arm::start();
+    assert!(!arm.ask("idle").contains("EStop"));
+    let mut stream = arm.connect().expect("it listens");
+    stream.set_read_timeout(Some(WITHIN)).expect("set");
+    let line = format!("e-stop{}", " ".repeat(250));
+    stream.write_all(line.as_bytes()).expect("written");
+    let mut answer = String::new();
+    stream.read_to_string(&mut answer).expect("an answer");
+    assert!(answer.contains("at most 256 bytes"), "{answer}");
+    assert!(!arm.ask("status").contains("EStop"));
+}

@@ -53,6 +53,39 @@ fn a_saved_fit_is_loaded_as_the_same_arm() {
 }
 
 #[test]
+fn a_collision_threshold_is_three_residuals_and_two_breakaway_torques() {
+    let description = Description::asset("wam4").unwrap();
+    let arm = description.arm::<4>().unwrap();
+    let joints = [0, 1, 3];
+    let found = fit(
+        &arm,
+        &[motion(&arm, &friction(), &joints, 900, 10)],
+        &joints,
+        &options(),
+    )
+    .unwrap();
+    let free = motion(&arm, &friction(), &joints, 300, 11);
+    let mut pushed = free.clone();
+    pushed.tau[(150, 1)] += 2.0;
+    let logs = [free, pushed].map(|motion| found.validate_motion(&motion).unwrap());
+    let mut config = description.config::<4>().unwrap();
+    let mut thresholds_nm = |present_nm| {
+        config.collision.move_joint_torque_nm = Vector::repeat(present_nm);
+        found.move_collision_nm(&logs, &config)
+    };
+    // Every joint breaks away at 0.5 N m.
+    let expected_nm = [Some(1.0), Some(3.0 * 2.0 + 1.0), None, Some(1.0)];
+    for (found_nm, expected_nm) in thresholds_nm(100.0).iter().zip(expected_nm) {
+        match (found_nm, expected_nm) {
+            (Some(found_nm), Some(nm)) => assert!((found_nm - nm).abs() < 0.1, "{found_nm} {nm}"),
+            (found_nm, expected_nm) => assert_eq!(*found_nm, expected_nm),
+        }
+    }
+    // A smaller present threshold stays.
+    assert_eq!(thresholds_nm(0.8), [Some(0.8), Some(0.8), None, Some(0.8)]);
+}
+
+#[test]
 fn a_prediction_is_the_torque_of_the_identified_arm_and_its_friction() {
     let description = Description::asset("wam4").unwrap();
     let arm = description.arm::<4>().unwrap();

@@ -156,6 +156,31 @@ fn a_model_identified_from_a_designed_motion_loads() {
     ]);
     assert_eq!(empty.code, Some(9), "{}", empty.stderr);
     assert_one_clear_line(&empty, &["centre_rad", "4 joints"]);
+    // Designed for another arm, with a joint that this one lacks.
+    let summary = std::fs::read_to_string(folder.path().join("design/summary.json"));
+    let mut edited: serde_json::Value =
+        serde_json::from_str(&summary.expect("a summary")).expect("JSON");
+    edited["arm"] = "another".into();
+    edited["moving"] = [0, 1, 3].as_slice().into();
+    std::fs::write(at("edited.json"), edited.to_string()).expect("written");
+    let foreign = run(&[
+        "excite",
+        "run",
+        "--arm",
+        "wam3",
+        "--design",
+        &at("edited.json"),
+        "--out",
+        &at("no"),
+    ]);
+    assert_eq!(foreign.code, Some(9), "{}", foreign.stderr);
+    for part in [
+        "designed for another, and runs on",
+        "joint 3 of `moving`",
+        "3 joints",
+    ] {
+        assert!(foreign.stderr.contains(part), "{part}: {}", foreign.stderr);
+    }
     let absent = run(&["excite", "run", "--arm", "wam3", "--design", &at("nowhere")]);
     assert_eq!(absent.code, Some(6), "{}", absent.stderr);
     let log = run(&["learn", "nowhere.mcap", "--arm", "wam3"]);
