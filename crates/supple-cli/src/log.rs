@@ -31,9 +31,9 @@ struct Exported<'a> {
 pub fn run(command: &LogDataCommand) -> Result<(), Failure> {
     match command {
         LogDataCommand::Info { file, json: false } => {
-            print_line(read(file, |file| info(file))?.to_string().trim_end())
+            print_line(read(file, info)?.to_string().trim_end())
         }
-        LogDataCommand::Info { file, json: true } => print_json(&read(file, |file| info(file))?),
+        LogDataCommand::Info { file, json: true } => print_json(&read(file, info)?),
         LogDataCommand::Export {
             file,
             channel,
@@ -59,7 +59,7 @@ pub fn run(command: &LogDataCommand) -> Result<(), Failure> {
             }
         }
         LogDataCommand::Replay { file, json } => {
-            let replay = read(file, |file| replay(file))?;
+            let replay = read(file, replay)?;
             match json {
                 true => print_json(&replay)?,
                 false => print_line(&replay.to_string())?,
