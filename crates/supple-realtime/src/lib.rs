@@ -31,7 +31,7 @@ pub use pause::pause;
 pub use private_folder::{
     PrivateFolderError, create_private_folder, open_private_folder, runtime_folder,
 };
-pub use processor::{ProcessorError, check_processor, run_on_supported_processor};
+pub use processor::run_on_supported_processor;
 pub use spin::spin_duration;
 pub use stop::{Stop, StopError, die_with_parent, ignore_file_size_and_tty_signals};
 

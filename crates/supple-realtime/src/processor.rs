@@ -5,8 +5,9 @@ use std::process::ExitCode;
 /// Exit code where the processor cannot run the program: the machine does not meet the requirements.
 const EXIT_CODE: u8 = 8;
 
-/// What x86-64-v3 adds: the name of the target feature when compiling and that of the flag in `/proc/cpuinfo`.
-const FLAGS: [(bool, &str); 6] = [
+/// What x86-64-v3 adds: whether this build uses it, and its flag in `/proc/cpuinfo`.
+const FLAGS: [(bool, &str); 7] = [
+    (cfg!(target_feature = "lzcnt"), "abm"),
     (cfg!(target_feature = "avx"), "avx"),
     (cfg!(target_feature = "avx2"), "avx2"),
     (cfg!(target_feature = "bmi1"), "bmi1"),
@@ -75,9 +76,9 @@ mod tests {
     #[test]
     fn missing_instructions_are_named() {
         let needed = FLAGS.map(|(_, flag)| (true, flag));
-        let error = check(&needed, OLD).expect_err("lacks four");
+        let error = check(&needed, OLD).expect_err("lacks five");
         assert!(
-            error.to_string().contains("avx2, bmi2, f16c, movbe"),
+            error.to_string().contains("abm, avx2, bmi2, f16c, movbe"),
             "{error}"
         );
     }
