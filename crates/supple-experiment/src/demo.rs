@@ -87,9 +87,10 @@ fn sized<const N: usize>(
         None => Setup::<N>::new(description, options.seed)?,
     };
     let setup = setup.with_plant_options(&options.plant)?;
-    let realistic_plant = match options.plant.is_none() {
-        true => PlantOptions::realistic_of(description),
-        false => options.plant.clone(),
+    // A model of another plant than the realistic one says nothing about it: each seed is calibrated there.
+    let (realistic_plant, realistic_model) = match options.plant.is_none() {
+        true => (PlantOptions::realistic_of(description), None),
+        false => (options.plant.clone(), options.model.as_ref()),
     };
     let jobs = jobs();
     let expected = |job: &Job| expected_s(job, &setup, options.seed);
@@ -120,8 +121,7 @@ fn sized<const N: usize>(
     let results = results.into_iter().map(|done| done.result).collect();
     let realistic = (0..seeds).into_par_iter().map(|offset| {
         let seed = options.seed.wrapping_add(offset);
-        let done =
-            realistic_seed::<N>(description, options.model.as_ref(), &realistic_plant, seed)?;
+        let done = realistic_seed::<N>(description, realistic_model, &realistic_plant, seed)?;
         report(REALISTIC_S, format!("realistic, seed {seed}"));
         Ok(done)
     });

@@ -12,7 +12,7 @@ pub struct DemoOptions {
     /// Existing folder for one MCAP for each run; `None` writes no logs.
     pub log_dir: Option<PathBuf>,
     /// Model of every controller, unperturbed; `None` uses the arm's own parameters, perturbed if the run
-    /// requires it.
+    /// requires it. Each seed on the realistic plant is calibrated there instead, unless `plant` has options.
     pub model: Option<Description>,
     /// Effects of a real arm in the plant of every run.
     pub plant: PlantOptions,

@@ -9,19 +9,27 @@ use supple_cli::exit::Failure;
 use supple_cli::out::Staging;
 use supple_experiment::{Demo, DemoOptions};
 use supple_model::Description;
+use supple_plant::PlantOptions;
 
 /// Runs `supple demo`.
 ///
 /// # Errors
 /// [`Failure`]; [`Failure::Fault`] after all results are written.
 pub fn run(args: &DemoArgs) -> Result<(), Failure> {
+    run_on(args, args.plant.options()?)
+}
+
+/// Runs `supple demo` on an arm with these effects of a real one instead of those of `args`.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_on(args: &DemoArgs, plant: PlantOptions) -> Result<(), Failure> {
     let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     let model = args
         .model
         .as_ref()
         .map(|path| arms::load(path, args.strict));
     let model = model.transpose()?;
-    let plant = args.plant.options()?;
     let staging = Staging::new(&args.out, &["report.html", "summary.json"])?;
     let options = DemoOptions {
         plant,

@@ -79,6 +79,8 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
         format!("{} N m", terms.join(", "))
     };
     let (ideal, imperfect) = plants(summary);
+    // A given model is perturbed in no run.
+    let given_model = summary.model.is_some();
     let realistic = summary
         .realistic
         .as_ref()
@@ -95,7 +97,9 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
             rms(&speeds.iter().map(|at| &at.tracking).collect::<Vec<_>>()),
             "essentially unchanged",
         ),
-        line(
+    ]);
+    if !given_model {
+        lines.push(line(
             &format!(
                 "  {} perturbed models: median, worst",
                 summary.perturbed_rms_m.len()
@@ -105,9 +109,14 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
                 worst_m,
             ]),
             "",
-        ),
+        ));
+    }
+    lines.extend([
         line(
-            "  exact model, plant without load-dependent friction: Coulomb, Stribeck",
+            match given_model {
+                true => "  plant without load-dependent friction: Coulomb, Stribeck",
+                false => "  exact model, plant without load-dependent friction: Coulomb, Stribeck",
+            },
             rms(&[&exact.coulomb, &exact.stribeck]),
             "",
         ),
@@ -141,13 +150,21 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
         ),
         line(
             &format!(
-                "  at {:.3} m/s: exact, perturbed model",
-                summary.quadrant.speed_m_per_s
+                "  at {:.3} m/s{}",
+                summary.quadrant.speed_m_per_s,
+                if given_model {
+                    ""
+                } else {
+                    ": exact, perturbed model"
+                }
             ),
-            rms(&[
-                &summary.quadrant.tracking,
-                &summary.quadrant_perturbed.tracking,
-            ]),
+            match given_model {
+                true => rms(&[&summary.quadrant.tracking]),
+                false => rms(&[
+                    &summary.quadrant.tracking,
+                    &summary.quadrant_perturbed.tracking,
+                ]),
+            },
             "",
         ),
         line("arc, RMS error", rms(&[&summary.arc]), ""),
@@ -268,7 +285,10 @@ fn contact(summary: &Summary) -> Vec<Line> {
             "largely independent of K",
         ),
         line(
-            "  at 5 N/m: no model error, rubber, 1 kg",
+            match summary.model {
+                Some(_) => "  at 5 N/m: steel, rubber, 1 kg",
+                None => "  at 5 N/m: no model error, rubber, 1 kg",
+            },
             [
                 &summary.probing_exact_model,
                 &summary.probing_rubber,

@@ -11,13 +11,31 @@ pub type Outcome = Result<(), TestCaseError>;
 /// Runs `property` on `cases` cases; `PROPTEST_CASES` and `PROPTEST_RNG_SEED` override number and
 /// seed.
 #[track_caller]
-pub fn check<S: Strategy>(cases: u32, strategy: S, property: impl Fn(S::Value) -> Outcome) {
+pub fn check<S: Strategy + 'static>(
+    cases: u32,
+    strategy: S,
+    property: impl Fn(S::Value) -> Outcome,
+) {
     run(config(cases, 20_260_102), strategy, property);
 }
 
 #[track_caller]
-pub fn run<S: Strategy>(config: Config, strategy: S, property: impl Fn(S::Value) -> Outcome) {
-    if let Err(failure) = TestRunner::new(config).run(&strategy, property) {
+pub fn run<S: Strategy + 'static>(
+    config: Config,
+    strategy: S,
+    property: impl Fn(S::Value) -> Outcome,
+) {
+    run_boxed(config, &strategy.boxed(), &property);
+}
+
+/// Compiled for each kind of case, not for each property.
+#[track_caller]
+fn run_boxed<T: std::fmt::Debug + 'static>(
+    config: Config,
+    strategy: &BoxedStrategy<T>,
+    property: &dyn Fn(T) -> Outcome,
+) {
+    if let Err(failure) = TestRunner::new(config).run(strategy, property) {
         panic!("{failure}");
     }
 }

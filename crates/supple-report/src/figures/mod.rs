@@ -13,6 +13,7 @@ mod figure_6;
 pub mod identification;
 mod law_as_printed;
 pub mod log;
+mod outline;
 mod panel;
 mod perturbed_models;
 mod png;

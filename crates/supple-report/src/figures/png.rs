@@ -1,9 +1,9 @@
-//! Renders SVG to PNG with embedded fonts, so that the result does not depend on installed fonts.
+//! Renders SVG to PNG.
 
 use super::error::FigureError;
+use super::outline::outline_text;
 use resvg::tiny_skia::{Pixmap, Transform};
 use resvg::usvg::{Options, Tree};
-use std::sync::Arc;
 
 /// Bitmap pixels per displayed pixel.
 const PIXEL_RATIO: f32 = 2.0;
@@ -14,11 +14,9 @@ pub fn render(name: &str, svg: &str) -> Result<Vec<u8>, FigureError> {
         name: name.to_owned(),
         reason,
     };
-    let mut options = Options::default();
-    let faces = Arc::make_mut(&mut options.fontdb);
-    faces.load_font_data(dejavu::sans::regular().to_vec());
-    faces.set_sans_serif_family("DejaVu Sans");
-    let tree = Tree::from_str(svg, &options).map_err(|error| failed(error.to_string()))?;
+    let svg = outline_text(svg).map_err(failed)?;
+    let tree =
+        Tree::from_str(&svg, &Options::default()).map_err(|error| failed(error.to_string()))?;
     let size = tree
         .size()
         .to_int_size()

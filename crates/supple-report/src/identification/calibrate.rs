@@ -4,7 +4,7 @@ use super::identify::{FILES, print, write};
 use super::report::{ReportInput, summary};
 use crate::demo;
 use serde::Serialize;
-use supple_cli::arguments::{CalibrateArgs, DemoArgs, UrdfArgs};
+use supple_cli::arguments::{CalibrateArgs, DemoArgs, PlantArgs, UrdfArgs};
 use supple_cli::arms;
 use supple_cli::console::{json, print_line, print_status};
 use supple_cli::exit::Failure;
@@ -54,8 +54,13 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
     if args.no_demo {
         return Ok(());
     }
+    // The demo is about the arm that was calibrated, with the noise of its encoders.
+    let effects = args.plant.options()?;
+    let realistic_seeds = u64::from(!effects.is_none());
+    let noise_rad = Calibration::new(args.seed).encoder_noise_rad;
+    let encoder_noise_rad = effects.encoder_noise_rad.or(Some(noise_rad));
     let plant = args.out.join(PLANT);
-    demo::run(&DemoArgs {
+    let demo = DemoArgs {
         urdf: UrdfArgs::default(),
         arm: match args.ripple > 0.0 {
             true => plant.display().to_string(),
@@ -68,9 +73,16 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
         json: false,
         quiet: args.quiet || args.json,
         no_logs: true,
-        realistic_seeds: 1,
-        plant: args.plant.clone(),
-    })
+        realistic_seeds,
+        plant: PlantArgs::default(),
+    };
+    demo::run_on(
+        &demo,
+        PlantOptions {
+            encoder_noise_rad,
+            ..effects
+        },
+    )
 }
 
 fn run_with_dof<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), Failure> {

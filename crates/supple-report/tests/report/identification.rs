@@ -188,14 +188,13 @@ fn a_model_identified_from_a_designed_motion_loads() {
 }
 
 #[test]
-fn a_calibration_prints_its_verdict_and_that_it_is_a_simulation() {
+fn a_calibration_prints_its_verdict_and_the_demo_with_its_model() {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("calibrated");
     let answer = run(&[
         "calibrate",
         "--ripple",
         "0.3",
-        "--no-demo",
         "--quiet",
         "--out",
         arg(&out),
@@ -207,6 +206,7 @@ fn a_calibration_prints_its_verdict_and_that_it_is_a_simulation() {
         "for 5 N/m: the residuals",
         "sinusoid at 5 N/m with this model",
         "this is a simulation",
+        "given plant: sinusoid at 5 N/m, RMS error",
     ] {
         assert!(
             answer.stdout.contains(words),
@@ -221,6 +221,7 @@ fn a_calibration_prints_its_verdict_and_that_it_is_a_simulation() {
         "calibration.json",
         "logs",
         "plant/arm.toml",
+        "demo/report.html",
     ] {
         assert!(out.join(file).exists(), "{file}");
     }
