@@ -17,6 +17,9 @@ mod law;
 pub mod math;
 mod model;
 pub mod record;
+#[cfg(debug_assertions)]
+#[doc(hidden)]
+pub mod sizes;
 pub mod trajectory;
 
 #[cfg(test)]

@@ -52,7 +52,7 @@ impl AbaJoint {
 /// Joint accelerations \[rad/s^2\] under the torques `tau` \[N m\], without friction.
 ///
 /// `q` \[rad\], `qd` \[rad/s\]. The inverse of [`rnea`](super::rnea).
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 pub fn aba<const N: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,
@@ -62,7 +62,7 @@ pub fn aba<const N: usize>(
     in_groups!(N, forward_dynamics(arm, q, qd, tau))
 }
 
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 fn forward_dynamics<const N: usize, const G: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,

@@ -17,7 +17,7 @@ use crate::math::{Matrix, Vector};
 use crate::model::arm::Arm;
 
 /// Symmetric mass matrix `H(q)`, with the rotor inertias added to its diagonal \[kg m^2\]. `q` \[rad\].
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 pub fn crba<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
     match N {
         ..=3 => link_by_link(arm, q),
@@ -25,7 +25,7 @@ pub fn crba<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
     }
 }
 
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 fn of_position<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
     let chain = Chain::<G>::new(arm, q);
     let last = joint_values(&chain.origins, N - 1);
@@ -37,7 +37,7 @@ fn of_position<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> M
 /// `H_ij = sum over k >= max(i, j) of (m_k v_ik . v_jk + w_ik . I_k w_jk)`, with `v_ik` and `w_ik` the velocity of the centre
 /// of mass and the angular velocity of link `k` for unit speed of joint `i` alone. `v` is in the frame of the first joint, `w`
 /// in that of link `k`. Lanes of links that joint `j` does not move have meaningless values, which are not added.
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 fn link_by_link<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
     let chain = Chain::<1>::from_first_joint(arm, q);
     let (r, origin) = (

@@ -13,47 +13,47 @@ use crate::model::arm::Arm;
 use crate::model::pose::Pose;
 
 /// Pose of every joint frame in the base, `base_from_joint`. `q` \[rad\].
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 pub fn joint_poses<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> [Pose; N] {
     in_groups!(N, poses(arm, q))
 }
 
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 fn poses<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> [Pose; N] {
     let chain = Chain::<G>::new(arm, q);
     core::array::from_fn(|i| chain.frame(i).pose())
 }
 
 /// Pose of the tip in the base, `base_from_tip`. `q` \[rad\].
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 pub fn tip_pose<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Pose {
     in_groups!(N, tip(arm, q))
 }
 
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 fn tip<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Pose {
     Chain::<G>::new(arm, q).tip.pose()
 }
 
 /// Geometric Jacobian of the tip: linear rows first, then angular, base axes. Eq. (3.5).
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 pub fn jacobian<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<6, N> {
     in_groups!(N, columns(arm, q))
 }
 
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 fn columns<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<6, N> {
     let chain = Chain::<G>::new(arm, q);
     matrix(&joint_motions(&chain, chain.tip.origin))
 }
 
 /// `J' qd`: classical acceleration of the tip at `qdd = 0` \[m/s^2, rad/s^2\], base axes.
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 pub fn jacobian_dot_qd<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>) -> Vector<6> {
     in_groups!(N, bias_acceleration(arm, q, qd))
 }
 
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 fn bias_acceleration<const N: usize, const G: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,

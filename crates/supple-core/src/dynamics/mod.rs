@@ -4,6 +4,9 @@
 //! depend on how far the wrist is from the base; their accelerations are classical (of the frame's origin). `terms`,
 //! `crba` and `momentum` work in base axes about the tip, `regressor` in base axes about the last joint, with spatial
 //! accelerations. Gravity `g` enters as an acceleration `-g` of the base.
+//!
+//! Functions of the number of joints are marked `inline` in optimised builds only: in others each unit of each crate that calls
+//! one would compile it again ([`crate::sizes`]).
 
 mod aba;
 mod body_motion;

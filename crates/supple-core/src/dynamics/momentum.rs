@@ -20,12 +20,12 @@ pub struct Momentum<const N: usize> {
 }
 
 /// Momentum and kinetic gradient at `q` \[rad\], `qd` \[rad/s\].
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 pub fn momentum<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>) -> Momentum<N> {
     in_groups!(N, of_state(arm, q, qd))
 }
 
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 fn of_state<const N: usize, const G: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,

@@ -42,7 +42,7 @@ pub type Regressor<const N: usize> = [[Vector<10>; N]; N];
 
 /// Joint-torque regressor: `rnea = Y p + armature qdd`, with [`parameters`] `p` and [`regressor_times`] for
 /// the product. `q` \[rad\], `qd` \[rad/s\], `qdd` \[rad/s^2\].
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 pub fn regressor<const N: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,
@@ -57,7 +57,7 @@ pub fn regressor<const N: usize>(
 
 /// As [`regressor`], row by row: calls `put(joint, link, row)` for every joint and every link that
 /// it moves.
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 pub fn regressor_rows<const N: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,
@@ -68,7 +68,7 @@ pub fn regressor_rows<const N: usize>(
     in_groups!(N, rows(arm, q, qd, qdd, put));
 }
 
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 fn rows<const N: usize, const G: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,

@@ -17,7 +17,7 @@ use crate::model::arm::Arm;
 /// Joint torques that give the accelerations `qdd`: `H qdd + C qd + G` \[N m\], without friction.
 ///
 /// `q` \[rad\], `qd` \[rad/s\], `qdd` \[rad/s^2\]. Eq. (3.1).
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 pub fn rnea<const N: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,
@@ -27,7 +27,7 @@ pub fn rnea<const N: usize>(
     in_groups!(N, inverse_dynamics(arm, q, qd, qdd))
 }
 
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 fn inverse_dynamics<const N: usize, const G: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,
@@ -70,12 +70,12 @@ fn inverse_dynamics<const N: usize, const G: usize>(
 }
 
 /// Joint torques that hold the arm still against gravity, `G(q)` \[N m\].
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 pub fn gravity<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Vector<N> {
     in_groups!(N, gravity_torques(arm, q))
 }
 
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 fn gravity_torques<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Vector<N> {
     let rotations = parent_rotations::<N, G>(arm, q);
     let mut gravity_in_joints = [[0.0; 3]; N];

@@ -5,12 +5,12 @@ use crate::math::{Matrix3, Vector};
 use crate::model::arm::Arm;
 
 /// Rotation of joint frame `i` in its parent's joint frame, for every joint.
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 pub(super) fn parent_rotations<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> [Matrix3<f64>; N] {
     in_groups!(N, rotations(arm, q))
 }
 
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 pub(super) fn rotations<const N: usize, const G: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,

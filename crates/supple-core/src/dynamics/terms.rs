@@ -50,7 +50,7 @@ impl<const N: usize> Default for Terms<N> {
 }
 
 /// Fills `out` for the state `q` \[rad\], `qd` \[rad/s\].
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 pub fn terms<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>, out: &mut Terms<N>) {
     in_groups!(N, swept(arm, q, qd, out));
 }

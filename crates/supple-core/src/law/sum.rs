@@ -18,7 +18,7 @@ use core::array::from_fn;
 ///
 /// `None` if the mass matrix of the active joints is not positive definite (not tested on the shorter
 /// way), or if fewer than six joints are active for a pose.
-#[inline]
+#[cfg_attr(not(debug_assertions), inline)]
 pub fn impedance_torque<T: Target<D>, const N: usize, const D: usize>(
     arm: &Arm<N>,
     roles: &[Role; N],

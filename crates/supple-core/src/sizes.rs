@@ -1,0 +1,52 @@
+//! Compiles the generic code here, once, for each number of joints that the programs serve. Crates that are compiled without
+//! full optimisation take it from here (`dev`, `test`); in others each crate compiles what it uses, so that this is left out.
+
+use crate::codes::RequestCode;
+use crate::controller::{Controller, CycleRecord, State, check_motion, limit, step};
+use crate::dynamics::inverse_kinematics::inverse_kinematics;
+use crate::dynamics::{
+    aba, coriolis, coriolis_matrix, crba, gravity, jacobian, jacobian_dot_qd, joint_poses,
+    kinetic_energy, momentum, potential_energy, regressor, rnea, terms, tip_pose,
+};
+use core::hint::black_box;
+
+/// Never called: that it is here has the functions compiled, and what they call.
+fn compile<const N: usize>() {
+    black_box([
+        step::<N> as *const (),
+        Controller::<N>::new as *const (),
+        State::<N>::new as *const (),
+        CycleRecord::<N>::new as *const (),
+        CycleRecord::<N>::pack as *const (),
+        CycleRecord::<N>::unpack as *const (),
+        RequestCode::new::<N> as *const (),
+        RequestCode::request::<N> as *const (),
+        check_motion::<N> as *const (),
+        limit::<N> as *const (),
+        aba::<N> as *const (),
+        coriolis::<N> as *const (),
+        coriolis_matrix::<N> as *const (),
+        crba::<N> as *const (),
+        gravity::<N> as *const (),
+        inverse_kinematics::<N> as *const (),
+        jacobian::<N> as *const (),
+        jacobian_dot_qd::<N> as *const (),
+        joint_poses::<N> as *const (),
+        kinetic_energy::<N> as *const (),
+        momentum::<N> as *const (),
+        potential_energy::<N> as *const (),
+        regressor::<N> as *const (),
+        rnea::<N> as *const (),
+        terms::<N> as *const (),
+        tip_pose::<N> as *const (),
+    ]);
+}
+
+/// The numbers of joints.
+pub static COMPILED: [fn(); 5] = [
+    compile::<3>,
+    compile::<4>,
+    compile::<5>,
+    compile::<6>,
+    compile::<7>,
+];
