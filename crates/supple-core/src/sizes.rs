@@ -1,5 +1,6 @@
-//! Compiles the generic code here, once, for each number of joints that the programs serve. Crates that are compiled without
-//! full optimisation take it from here (`dev`, `test`); in others each crate compiles what it uses, so that this is left out.
+//! Compiles the generic code here, once, for each number of joints that `supple_model::with_dof` accepts. Between crates at
+//! optimisation levels 0, 1, s and z rustc shares generic code; debug assertions stand for these levels (`dev`, `test`). At
+//! other levels each crate compiles what it uses, and this module is left out.
 
 use crate::codes::RequestCode;
 use crate::controller::{Controller, CycleRecord, State, check_motion, limit, step};
@@ -10,7 +11,7 @@ use crate::dynamics::{
 };
 use core::hint::black_box;
 
-/// Never called: that it is here has the functions compiled, and what they call.
+/// Never called. Naming the functions makes rustc compile them and all that they call.
 fn compile<const N: usize>() {
     black_box([
         step::<N> as *const (),
@@ -42,7 +43,7 @@ fn compile<const N: usize>() {
     ]);
 }
 
-/// The numbers of joints.
+/// One for each number of joints.
 pub static COMPILED: [fn(); 5] = [
     compile::<3>,
     compile::<4>,

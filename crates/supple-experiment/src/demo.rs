@@ -87,11 +87,7 @@ fn sized<const N: usize>(
         None => Setup::<N>::new(description, options.seed)?,
     };
     let setup = setup.with_plant_options(&options.plant)?;
-    // A model of another plant than the realistic one says nothing about it: each seed is calibrated there.
-    let (realistic_plant, realistic_model) = match options.plant.is_none() {
-        true => (PlantOptions::realistic_of(description), None),
-        false => (options.plant.clone(), options.model.as_ref()),
-    };
+    let (realistic_plant, realistic_model) = realistic_arm(description, options);
     let jobs = jobs();
     let expected = |job: &Job| expected_s(job, &setup, options.seed);
     let seeds = options.realistic_seeds;
@@ -137,6 +133,18 @@ fn sized<const N: usize>(
         });
     }
     Ok(demo)
+}
+
+/// Effects of the arm that the realistic runs are about, and the model that they use instead of calibrating.
+fn realistic_arm<'a>(
+    description: &Description,
+    options: &'a DemoOptions,
+) -> (PlantOptions, Option<&'a Description>) {
+    match options.plant.is_none() {
+        // A given model is that of another plant: each seed is calibrated.
+        true => (PlantOptions::realistic_of(description), None),
+        false => (options.plant.clone(), options.model.as_ref()),
+    }
 }
 
 fn tracking(run: &Run) -> TrackingError {
@@ -343,5 +351,32 @@ fn assemble(
         probing_fade_off,
         probing_rubber,
         law_as_printed,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{DemoOptions, realistic_arm};
+    use supple_model::Description;
+    use supple_plant::PlantOptions;
+
+    #[test]
+    fn a_given_model_serves_only_the_plant_that_is_given_with_it() {
+        let arm = Description::asset("wam4").expect("a built-in arm");
+        let mut options = DemoOptions {
+            seed: 0,
+            log_dir: None,
+            model: Some(arm.clone()),
+            plant: PlantOptions::default(),
+            realistic_seeds: 1,
+        };
+        let (plant, model) = realistic_arm(&arm, &options);
+        assert_eq!(plant, PlantOptions::realistic_of(&arm));
+        assert!(model.is_none());
+
+        options.plant.encoder_noise_rad = Some(5e-4);
+        let (plant, model) = realistic_arm(&arm, &options);
+        assert_eq!(plant, options.plant);
+        assert!(model.is_some());
     }
 }

@@ -1,6 +1,6 @@
 //! From a number of joints to code for arms of this size.
 
-/// Evaluates an expression for a number of joints that is known only at run time: 3 to 7.
+/// Evaluates an expression for a number of joints that is known only at run time: 3 to 7, as in `supple_core::sizes`.
 ///
 /// `with_dof!(description.dof(), N => run::<N>(&description))` returns the value of the expression in `Ok`,
 /// or [`ModelError::Dof`](crate::ModelError::Dof) for another number of joints.

@@ -7,6 +7,7 @@ use supple_cli::arms;
 use supple_cli::console::{json, print_line, print_status};
 use supple_cli::exit::Failure;
 use supple_cli::out::Staging;
+use supple_experiment::summary::Summary;
 use supple_experiment::{Demo, DemoOptions};
 use supple_model::Description;
 use supple_plant::PlantOptions;
@@ -16,14 +17,54 @@ use supple_plant::PlantOptions;
 /// # Errors
 /// [`Failure`]; [`Failure::Fault`] after all results are written.
 pub fn run(args: &DemoArgs) -> Result<(), Failure> {
-    run_on(args, args.plant.options()?)
+    let summary = perform(args, args.plant.options()?)?;
+    if args.json {
+        print_line(&json(&summary)?)?;
+    } else {
+        print(&summary)?;
+    }
+    finish(args, &summary)
 }
 
-/// Runs `supple demo` on an arm with these effects of a real one instead of those of `args`.
+/// Prints the summary as a table.
 ///
 /// # Errors
-/// As [`run`].
-pub fn run_on(args: &DemoArgs, plant: PlantOptions) -> Result<(), Failure> {
+/// [`Failure`] of standard output.
+pub fn print(summary: &Summary) -> Result<(), Failure> {
+    print_line(&format!("{}\n", table::table(summary)))?;
+    let notes = table::arm_notes(summary);
+    match notes.is_empty() {
+        true => Ok(()),
+        false => print_line(&format!("Notes for this arm:\n  {}\n", notes.join("\n  "))),
+    }
+}
+
+/// Names the report, and the faults that ended runs early.
+///
+/// # Errors
+/// [`Failure::Fault`].
+pub fn finish(args: &DemoArgs, summary: &Summary) -> Result<(), Failure> {
+    if !args.quiet {
+        print_status(&format!(
+            "report: {}",
+            args.out.join("report.html").display()
+        ));
+    }
+    let faults = report::fault_lines(summary);
+    if faults.is_empty() {
+        return Ok(());
+    }
+    Err(Failure::Fault {
+        runs: faults.join("; "),
+        out: args.out.clone(),
+    })
+}
+
+/// Runs the experiments on an arm with these effects of a real one instead of those of `args`, and writes all results.
+///
+/// # Errors
+/// [`Failure`].
+pub fn perform(args: &DemoArgs, plant: PlantOptions) -> Result<Summary, Failure> {
     let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     let model = args
         .model
@@ -46,31 +87,9 @@ pub fn run_on(args: &DemoArgs, plant: PlantOptions) -> Result<(), Failure> {
     meter.finish();
     let demo = demo?;
 
-    let summary = json(&demo.summary)?;
-    write(&staging, &demo, &arm, &summary, !args.no_logs)?;
+    write(&staging, &demo, &arm, &json(&demo.summary)?, !args.no_logs)?;
     staging.publish()?;
-
-    if args.json {
-        print_line(&summary)?;
-    } else {
-        print_line(&format!("{}\n", table::table(&demo.summary)))?;
-        let notes = table::arm_notes(&demo.summary);
-        if !notes.is_empty() {
-            print_line(&format!("Notes for this arm:\n  {}\n", notes.join("\n  ")))?;
-        }
-    }
-    let report = args.out.join("report.html");
-    if !args.quiet {
-        print_status(&format!("report: {}", report.display()));
-    }
-    let faults = report::fault_lines(&demo.summary);
-    if faults.is_empty() {
-        return Ok(());
-    }
-    Err(Failure::Fault {
-        runs: faults.join("; "),
-        out: args.out.clone(),
-    })
+    Ok(demo.summary)
 }
 
 /// Writes figures, report and summary of a demo.

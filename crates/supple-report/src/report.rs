@@ -19,6 +19,8 @@ struct Report<'a> {
     joints: String,
     seed: u64,
     model: Option<&'a str>,
+    /// Whether most rows are of a plant without the effects of a real arm.
+    ideal: bool,
     logs: bool,
     faults: Vec<String>,
     adapted: Vec<String>,
@@ -68,6 +70,7 @@ pub fn html(
         joints: arm.joint_names().join(", "),
         seed: summary.seed,
         model: summary.model.as_deref(),
+        ideal: summary.plant.is_none(),
         logs,
         faults: fault_lines(summary),
         adapted: arm_notes(summary),

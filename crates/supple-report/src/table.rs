@@ -185,6 +185,8 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
 /// Names of the plant of most rows, and of the one on which the model is calibrated.
 pub(crate) fn plants(summary: &Summary) -> (&'static str, &'static str) {
     match summary.plant.is_none() {
+        // A given model is not that of the realistic plant: the demo calibrates there.
+        true if summary.model.is_some() => ("ideal plant", "realistic plant, its own model"),
         true => ("ideal plant", "realistic plant"),
         false => ("given plant", "given plant"),
     }
@@ -286,7 +288,7 @@ fn contact(summary: &Summary) -> Vec<Line> {
         ),
         line(
             match summary.model {
-                Some(_) => "  at 5 N/m: steel, rubber, 1 kg",
+                Some(_) => "  at 5 N/m: wood, rubber, 1 kg",
                 None => "  at 5 N/m: no model error, rubber, 1 kg",
             },
             [

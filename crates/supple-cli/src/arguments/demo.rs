@@ -16,8 +16,8 @@ pub struct DemoArgs {
     #[command(flatten)]
     pub urdf: UrdfArgs,
     /// The controller's model of the arm, for example the output of `supple identify`: path of its TOML or folder.
-    /// Default: the plant's own parameters, with the perturbations that each experiment defines. The arms of
-    /// --realistic-seeds are calibrated themselves, unless the effects of a real one are given too.
+    /// Default: the plant's own parameters, with the perturbations that each experiment defines. Without options of
+    /// the simulated arm, each of --realistic-seeds is calibrated and uses its own model, not this one.
     #[arg(long, value_name = "PATH")]
     pub model: Option<PathBuf>,
     /// Folder for all results. Files in it of the same names are replaced, others are left alone.

@@ -5,8 +5,8 @@
 //! `crba` and `momentum` work in base axes about the tip, `regressor` in base axes about the last joint, with spatial
 //! accelerations. Gravity `g` enters as an acceleration `-g` of the base.
 //!
-//! Functions of the number of joints are marked `inline` in optimised builds only: in others each unit of each crate that calls
-//! one would compile it again ([`crate::sizes`]).
+//! Functions of the number of joints are marked `inline` only in builds without debug assertions: in others (`dev`, `test`) each
+//! unit of each crate that calls one would compile it again (`sizes.rs`). So is `impedance_torque` of the law.
 
 mod aba;
 mod body_motion;

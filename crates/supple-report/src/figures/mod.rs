@@ -79,7 +79,7 @@ pub fn all(demo: &Demo) -> Result<Vec<Figure>, FigureError> {
         ),
         (
             "perturbed_models",
-            exact && !summary.perturbed_rms_m.is_empty(),
+            exact && summary.model.is_none() && !summary.perturbed_rms_m.is_empty(),
             Box::new(|| perturbed_models::draw(&perturbed_models::PerturbedModels::of(demo))),
         ),
         (

@@ -33,3 +33,21 @@ pub fn render(name: &str, svg: &str) -> Result<Vec<u8>, FigureError> {
         .encode_png()
         .map_err(|error| failed(error.to_string()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::render;
+    use resvg::tiny_skia::Pixmap;
+
+    #[test]
+    fn text_is_drawn() {
+        let svg = "<svg width=\"60\" height=\"20\" viewBox=\"0 0 60 20\" xmlns=\"http://www.w3.org/2000/svg\"><rect width=\"60\" \
+                   height=\"20\" fill=\"#FFFFFF\"/><text x=\"30\" y=\"15\" dy=\"0em\" text-anchor=\"middle\" font-size=\"12\" \
+                   fill=\"#000000\">error [mm]</text></svg>";
+        let png = render("text", svg).expect("it is rendered");
+        let bitmap = Pixmap::decode_png(&png).expect("a PNG");
+        assert_eq!((bitmap.width(), bitmap.height()), (120, 40));
+        let dark = bitmap.pixels().iter().filter(|p| p.red() < 0x40).count();
+        assert!(dark > 100, "{dark} dark pixels");
+    }
+}

@@ -4,7 +4,7 @@ use super::identify::{FILES, print, write};
 use super::report::{ReportInput, summary};
 use crate::demo;
 use serde::Serialize;
-use supple_cli::arguments::{CalibrateArgs, DemoArgs, PlantArgs, UrdfArgs};
+use supple_cli::arguments::{CalibrateArgs, DemoArgs, PlantArgs};
 use supple_cli::arms;
 use supple_cli::console::{json, print_line, print_status};
 use supple_cli::exit::Failure;
@@ -54,14 +54,15 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
     if args.no_demo {
         return Ok(());
     }
-    // The demo is about the arm that was calibrated, with the noise of its encoders.
+    // The demo is about the arm that was calibrated, with the noise of its encoders; its friction depends on direction and load
+    // also after a calibration without.
     let effects = args.plant.options()?;
     let realistic_seeds = u64::from(!effects.is_none());
     let noise_rad = Calibration::new(args.seed).encoder_noise_rad;
     let encoder_noise_rad = effects.encoder_noise_rad.or(Some(noise_rad));
     let plant = args.out.join(PLANT);
     let demo = DemoArgs {
-        urdf: UrdfArgs::default(),
+        urdf: args.urdf.clone(),
         arm: match args.ripple > 0.0 {
             true => plant.display().to_string(),
             false => args.arm.clone(),
@@ -76,13 +77,17 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
         realistic_seeds,
         plant: PlantArgs::default(),
     };
-    demo::run_on(
+    let summary = demo::perform(
         &demo,
         PlantOptions {
             encoder_noise_rad,
             ..effects
         },
-    )
+    )?;
+    if !args.json {
+        demo::print(&summary)?;
+    }
+    demo::finish(&demo, &summary)
 }
 
 fn run_with_dof<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Result<(), Failure> {
@@ -134,8 +139,12 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Resu
         predicted_tracking,
     };
     if args.ripple > 0.0 {
-        // The demo that follows uses the plant including its ripple.
-        let plant = plant_of::<N>(arm, &calibration)?;
+        // The demo that follows uses the plant including its ripple, and adds the other effects itself.
+        let rippling = Calibration {
+            plant: PlantOptions::default(),
+            ..calibration.clone()
+        };
+        let plant = plant_of::<N>(arm, &rippling)?;
         described_plant(arm, &plant)?.save(&staging.folder(PLANT)?)?;
     }
     let identification = summary(&report);

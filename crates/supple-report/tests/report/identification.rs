@@ -225,6 +225,17 @@ fn a_calibration_prints_its_verdict_and_the_demo_with_its_model() {
     ] {
         assert!(out.join(file).exists(), "{file}");
     }
+    assert!(
+        !answer.stdout.contains("perturbed model"),
+        "{}",
+        answer.stdout
+    );
+    // The demo is about the arm that was calibrated: with its model and its encoders, without another plant.
+    let summary = std::fs::read_to_string(out.join("demo/summary.json")).expect("a summary");
+    let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
+    assert!(summary["model"].is_string(), "{}", summary["model"]);
+    assert_eq!(summary["plant"]["encoder_noise_rad"], 5e-4);
+    assert!(summary["realistic"].is_null(), "{}", summary["realistic"]);
 }
 
 /// Expected before the run: ten of twelve combinations; moments within 5 % of the plant's; gravity within 3 %.
