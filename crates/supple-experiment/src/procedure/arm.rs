@@ -3,6 +3,7 @@
 //! [`super::InProcessArm`] is the simulated arm in this process; the program `supple` has one for systems of processes.
 
 use super::error::ProcedureError;
+use super::options::{DRIVES_REMEDY, HOLD_REMEDY};
 use crate::request_sequence::{Recording, Step};
 use supple_core::Vector;
 use supple_model::Description;
@@ -75,8 +76,37 @@ pub struct Stopped {
     pub step: usize,
     /// The fault in words.
     pub fault: String,
-    /// Whether it is one that contact causes: a collision, or a joint that is held back.
-    pub by_contact: bool,
+    /// Its cause.
+    pub cause: StopCause,
+}
+
+/// What stops a motion.
+#[derive(Clone, Copy, Debug, Eq, PartialEq)]
+pub enum StopCause {
+    /// A fault that contact causes: a collision, or a joint that is held back.
+    Contact,
+    /// The drives became inactive: an operator, the safety module, or torques that came too late.
+    Drives,
+    /// Any other fault.
+    Other,
+}
+
+impl StopCause {
+    /// The cause of a fault of the controller.
+    pub fn of_fault(by_contact: bool) -> StopCause {
+        match by_contact {
+            true => StopCause::Contact,
+            false => StopCause::Other,
+        }
+    }
+
+    /// What to do if the motion need not be free.
+    pub(crate) fn remedy(self) -> &'static str {
+        match self {
+            StopCause::Drives => DRIVES_REMEDY,
+            StopCause::Contact | StopCause::Other => HOLD_REMEDY,
+        }
+    }
 }
 
 impl Motion {

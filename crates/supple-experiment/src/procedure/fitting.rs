@@ -137,7 +137,8 @@ fn every_joint_moves(log: &Log) -> bool {
 }
 
 /// Fits a model to `others` and to the excitation without its end, which validates the fit. `None` if the fit predicts the
-/// torques of that end no better than `model`.
+/// torques of that end no better than `model`, or if no controller starts with it: after so little motion rotors may be found
+/// to have no inertia, and any damping then shakes the joint.
 ///
 /// # Errors
 /// A log that cannot be used.
@@ -161,10 +162,9 @@ pub fn fit_first<const N: usize>(
     )?;
     let quality = quality(&config, &fit, &prepared(&held_out, &fit)?)?;
     let is_better = quality.validation_relative < quality.validation_relative_before;
-    if !is_better {
-        return Ok(None);
-    }
-    Ok(Some((fit.description(model, None)?, quality)))
+    let found = fit.description(model, None)?;
+    let is_used = is_better && found.completed().is_ok();
+    Ok(is_used.then_some((found, quality)))
 }
 
 /// Fits a model to `logs` (excitations and slow motions) and the torque ripple to `constant_speed`, and validates both on the

@@ -1,6 +1,6 @@
 //! The simulated arm in this process, in virtual time: time passes only while it moves.
 
-use super::arm::{Motion, MotionArm, Performed, Stopped};
+use super::arm::{Motion, MotionArm, Performed, StopCause, Stopped};
 use super::error::ProcedureError;
 use crate::error::ExperimentError;
 use crate::record::Recorder;
@@ -142,7 +142,7 @@ impl<const N: usize> InProcessArm<N> {
                     performed.stopped = Some(Stopped {
                         step: number,
                         fault: in_words(&config, &fault),
-                        by_contact: is_contact(&fault),
+                        cause: StopCause::of_fault(is_contact(&fault)),
                     });
                 }
                 if moves_joints(output.mode) {

@@ -24,7 +24,7 @@ mod wiring;
 pub(crate) use options::HOLD_REMEDY;
 pub use options::{DRAWING, FIRST_MODEL, LEARNING_S, LOGS, Operator, ProcedureOptions};
 
-pub use arm::{Collector, Motion, MotionArm, Performed, Stopped};
+pub use arm::{Collector, Motion, MotionArm, Performed, StopCause, Stopped};
 pub use error::ProcedureError;
 pub use fitting::read_excitations;
 pub use in_process::{InProcessArm, moves_joints};

@@ -11,6 +11,10 @@ pub const LEARNING_S: f64 = 24.0;
 pub(crate) const HOLD_REMEDY: &str = "check signs and units of the torques, the order of joints, the mounting of the base and the masses of the \
      description: the arm must stay where it is in gravity hold";
 
+/// Remedy for drives that became inactive during a motion.
+pub(crate) const DRIVES_REMEDY: &str = "see what their process has written before this: an operator or the safety module made them idle, \
+     or torques came too late (use real-time priority and a machine that does nothing else)";
+
 /// Folder of the logs, within that of the results.
 pub const LOGS: &str = "logs";
 

@@ -13,7 +13,9 @@ use supple_core::Vector;
 use supple_core::codes::fault_kind;
 use supple_core::controller::{Mode, Request};
 use supple_experiment::Step;
-use supple_experiment::procedure::{Motion, MotionArm, Performed, Stopped, moves_joints};
+use supple_experiment::procedure::{
+    Motion, MotionArm, Performed, StopCause, Stopped, moves_joints,
+};
 use supple_ipc::message::{Drives, OperatorReply, Telemetry};
 use supple_ipc::{Domain, TelemetryReader};
 use supple_model::Description;
@@ -406,7 +408,7 @@ impl<const N: usize> RunningArm<N> {
                     performed.stopped = Some(Stopped {
                         step: number,
                         fault: record.fault_text.to_string(),
-                        by_contact: is_contact(record.fault),
+                        cause: StopCause::of_fault(is_contact(record.fault)),
                     });
                     break;
                 }
@@ -426,7 +428,7 @@ impl<const N: usize> RunningArm<N> {
                     performed.stopped = Some(Stopped {
                         step: number,
                         fault: "the drives are not active".to_owned(),
-                        by_contact: false,
+                        cause: StopCause::Drives,
                     });
                     break;
                 }

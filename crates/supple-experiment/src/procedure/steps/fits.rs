@@ -47,7 +47,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
                 100.0 * quality.validation_relative,
                 100.0 * quality.validation_relative_before
             )),
-            None => self.say("the first fit is no better than the model before it, which stays"),
+            None => self.say("the first fit is no better than the model before it, or no controller starts with it: that model stays"),
         }
         let folder = self.options.out.join(FIRST_MODEL);
         found.save(&folder).map_err(ProcedureError::from)?;

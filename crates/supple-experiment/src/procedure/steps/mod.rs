@@ -7,11 +7,11 @@ mod trials;
 mod wiring;
 
 use crate::excite::move_to;
-use crate::procedure::arm::{Motion, MotionArm};
+use crate::procedure::arm::{Motion, MotionArm, StopCause};
 use crate::procedure::error::ProcedureError;
 use crate::procedure::progress::{FinishedStep, Progress, StepName};
 use crate::procedure::thresholds::minimum_thresholds;
-use crate::procedure::{FIRST_MODEL, HOLD_REMEDY, Operator, ProcedureOptions};
+use crate::procedure::{FIRST_MODEL, Operator, ProcedureOptions};
 use crate::request_sequence::Step;
 use std::path::PathBuf;
 use supple_core::config::JointGains;
@@ -254,16 +254,16 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             };
             let fault = stopped.fault;
             contacts.push(fault.clone());
-            let remedy = match (stopped.by_contact, contacts.len() < ATTEMPTS) {
-                (true, true) => {
+            let remedy = match (stopped.cause, contacts.len() < ATTEMPTS) {
+                (StopCause::Contact, true) => {
                     self.say(&format!(
                         "{name}: {fault}; the arm rests, then repeats the motion"
                     ));
                     self.arm.recover()?;
                     continue;
                 }
-                (true, false) => "clear the space that the arm sweeps",
-                (false, _) => HOLD_REMEDY,
+                (StopCause::Contact, false) => "clear the space that the arm sweeps",
+                (cause, _) => cause.remedy(),
             };
             self.progress.write(&self.options.out)?;
             return Err(ProcedureError::Stopped {

@@ -104,8 +104,10 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             (None, Some(recording)) => Ok(recording),
             (stopped, _) => Err(ProcedureError::Stopped {
                 motion: format!("torque ramp on joint {joint} ({})", self.names[joint]),
+                remedy: stopped
+                    .as_ref()
+                    .map_or(HOLD_REMEDY, |stopped| stopped.cause.remedy()),
                 fault: stopped.map_or("no data".to_owned(), |stopped| stopped.fault),
-                remedy: HOLD_REMEDY,
             }
             .into()),
         }
