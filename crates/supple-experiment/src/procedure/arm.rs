@@ -100,7 +100,7 @@ impl StopCause {
         }
     }
 
-    /// What to do if the motion need not be free.
+    /// What to do where contact has no remedy of its own.
     pub(crate) fn remedy(self) -> &'static str {
         match self {
             StopCause::Drives => DRIVES_REMEDY,

@@ -162,9 +162,11 @@ pub fn fit_first<const N: usize>(
     )?;
     let quality = quality(&config, &fit, &prepared(&held_out, &fit)?)?;
     let is_better = quality.validation_relative < quality.validation_relative_before;
+    if !is_better {
+        return Ok(None);
+    }
     let found = fit.description(model, None)?;
-    let is_used = is_better && found.completed().is_ok();
-    Ok(is_used.then_some((found, quality)))
+    Ok(found.completed().is_ok().then_some((found, quality)))
 }
 
 /// Fits a model to `logs` (excitations and slow motions) and the torque ripple to `constant_speed`, and validates both on the
