@@ -1,6 +1,8 @@
 //! Command-line options.
 
 use clap::Parser;
+use core::fmt::Display;
+use std::io::Write as _;
 use supple_bus::Address;
 use supple_model::{Description, ModelError};
 use supple_puck::safety::SpeedLimit;
@@ -86,4 +88,9 @@ fn speed(text: &str) -> Result<f64, String> {
     SpeedLimit::from_m_per_s(speed)
         .map(|_| speed)
         .map_err(|error| error.to_string())
+}
+
+/// Writes a budget to standard output. A closed pipe is not an error.
+pub fn print_budget(text: &dyn Display) {
+    let _ = writeln!(std::io::stdout(), "{text}");
 }

@@ -5,7 +5,7 @@ use super::cycle::cycle;
 use super::error::CanError;
 use super::start_up::{Progress, StartupConfig, start_up};
 use crate::cycles::{Ended, SEARCH_INTERVAL, open, run_until_shutdown, sum_counters};
-use crate::options::Options;
+use crate::options::{Options, print_budget};
 use supple_bus::{Address, BusError};
 use supple_drive::{Counters, CycleConfig, SharedMemoryLink};
 use supple_ipc::{Domain, PlantLink};
@@ -39,7 +39,7 @@ fn run_joints<const N: usize>(
     };
     if options.budget {
         let time = BusTime::new(N, 0, true, cycle_config.answer_ns);
-        println!("{}", time.budget(cycle_config.period_ns));
+        print_budget(&time.budget(cycle_config.period_ns));
         time.check(cycle_config.period_ns)?;
         return Ok(None);
     }

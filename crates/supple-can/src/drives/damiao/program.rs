@@ -4,7 +4,7 @@ use super::drive::{Damiao, budget};
 use super::error::DamiaoError;
 use super::start_up::{rates, start_up};
 use crate::cycles::{Ended, SEARCH_INTERVAL, open, run_until_shutdown, sum_counters};
-use crate::options::Options;
+use crate::options::{Options, print_budget};
 use supple_bus::{Address, Bus, BusError};
 use supple_can_frame::BitRates;
 use supple_core::{Config, Vector};
@@ -162,15 +162,15 @@ fn check_rate(
     let budget = budget(rates(bus), joints);
     let budget = budget.off_bus_time("the controller's answer", cycle_config.answer_ns);
     if shown {
-        println!("{}", budget.display(cycle_config.period_ns));
+        print_budget(&budget.display(cycle_config.period_ns));
         let other = match rates(bus).has_fd() {
             true => BitRates::CLASSIC_1M,
             false => BitRates::FD_1M_5M,
         };
         let other = super::budget(other, joints);
         let other = other.off_bus_time("the controller's answer", cycle_config.answer_ns);
-        println!("\nWith the motors set to the other format:");
-        println!("{}", other.display(cycle_config.period_ns));
+        print_budget(&"\nWith the motors set to the other format:");
+        print_budget(&other.display(cycle_config.period_ns));
     }
     Ok(budget.check(cycle_config.period_ns)?)
 }
