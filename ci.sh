@@ -205,9 +205,9 @@ step_edits() {
     cargo test --locked --workspace --exclude supple-python --test record_edits -- --ignored
 }
 
-# cycles: 10 million cycles of the core with random requests and inputs, optimised; SUPPLE_CYCLES for another number
+# cycles: 10 million cycles of the core with random requests and inputs, as `test` builds it; SUPPLE_CYCLES for another number
 step_cycles() {
-    SUPPLE_CYCLES=${SUPPLE_CYCLES:-10000000} cargo test --locked --release -p supple-core --test cycles
+    SUPPLE_CYCLES=${SUPPLE_CYCLES:-10000000} cargo test --locked --workspace --exclude supple-python --test cycles
 }
 
 # fuzz: each target of tests/fuzz for a minute, SUPPLE_FUZZ_S for another time; without a nightly compiler, seeded mutations
