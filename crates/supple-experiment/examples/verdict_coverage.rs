@@ -4,71 +4,140 @@
 //! cargo run --release -p supple-experiment --example verdict_coverage -- FOLDER
 //! ```
 
-use supple_experiment::error_interval;
+use core::ops::Range;
+use std::collections::BTreeMap;
+use std::path::Path;
+use supple_experiment::{ErrorInterval, SinusoidRegion, error_interval};
 use supple_ident::{DMatrix, Motion};
-use supple_model::Description;
+use supple_model::{Description, with_dof};
 
 /// Seeds from here on are those of ideal plants.
 const IDEAL: u64 = 10_000;
+/// Seeds on which the factor of the upper bound was chosen.
+const CHOSEN_ON: [Range<u64>; 2] = [0..55, 130..185];
+/// Stiffness of the tracking \[N/m\].
+const STIFFNESS_N_PER_M: f64 = 5.0;
 
-fn matrix(rows: &[Vec<f64>], first: usize) -> DMatrix<f64> {
-    DMatrix::from_fn(rows.len(), 4, |i, j| rows[i][first + 3 * j])
+/// The interval from the held-out motion in a file.
+fn interval<const N: usize>(
+    description: &Description,
+    text: &str,
+) -> Result<ErrorInterval, Box<dyn std::error::Error>> {
+    let held = text.lines().filter_map(|line| line.strip_prefix("held,"));
+    let rows: Vec<Vec<f64>> = held
+        .map(|line| line.split(',').map(str::parse).collect())
+        .collect::<Result<_, _>>()?;
+    let matrix = |first: usize| DMatrix::from_fn(rows.len(), N, |i, j| rows[i][first + 3 * j]);
+    let (Some(first), Some(last)) = (rows.first(), rows.last()) else {
+        return Err("no held-out motion".into());
+    };
+    let motion = Motion {
+        rate_hz: (rows.len() - 1) as f64 / (last[0] - first[0]),
+        q: matrix(1),
+        qd: matrix(2),
+        qdd: DMatrix::zeros(rows.len(), N),
+        tau: DMatrix::zeros(rows.len(), N),
+        independent_fraction: 1.0,
+        cutoff_hz: None,
+        start_s: first[0],
+        torque_delay_s: 0.0,
+        masks: Vec::new(),
+    };
+    let region = SinusoidRegion::<N>::new(description)?.ok_or("the sinusoid is out of reach")?;
+    let moving: Vec<usize> = (0..N).collect();
+    let residuals = matrix(3);
+    let interval = error_interval(
+        &region,
+        &moving,
+        &[(&motion, &residuals)],
+        STIFFNESS_N_PER_M,
+    );
+    Ok(interval.ok_or("no interval")?)
+}
+
+/// Measured error of a run, and the interval that was stated for it \[m\].
+struct Judged {
+    error_m: f64,
+    interval: ErrorInterval,
+}
+
+fn print_row(name: &str, runs: &[Judged]) {
+    let mut ratios: Vec<f64> = runs
+        .iter()
+        .map(|run| run.interval.upper_m / run.error_m)
+        .collect();
+    ratios.sort_by(f64::total_cmp);
+    let share = |of: &dyn Fn(&Judged) -> bool| {
+        let count = runs.iter().filter(|run| of(run)).count();
+        format!(
+            "{count} ({:.0} %)",
+            100.0 * count as f64 / runs.len() as f64
+        )
+    };
+    let quantile = |share: f64| ratios[(share * (ratios.len() - 1) as f64).round() as usize];
+    println!(
+        "| {name} | {} | {} | {} | {:.2} | {:.2} | {:.2} |",
+        runs.len(),
+        share(&|run| run.error_m <= run.interval.upper_m),
+        share(&|run| run.error_m < run.interval.lower_m),
+        quantile(0.5),
+        quantile(0.0),
+        quantile(0.1)
+    );
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = std::env::args()
         .nth(1)
         .ok_or("usage: verdict_coverage FOLDER")?;
-    let config = Description::asset("wam4")?.config::<4>()?;
-    let (mut failed, mut ratios) = (0, [Vec::new(), Vec::new()]);
+    let mut failed = 0;
+    let mut judged = BTreeMap::<String, Vec<Judged>>::new();
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
-        let Some(seed) = path
-            .file_stem()
-            .and_then(|s| s.to_str()?.parse::<u64>().ok())
-        else {
+        let stem = path.file_stem().and_then(|stem| stem.to_str());
+        let Some(seed) = stem.and_then(|stem| stem.parse::<u64>().ok()) else {
             continue;
         };
         let text = std::fs::read_to_string(&path)?;
-        let head = text.lines().next().unwrap_or_default();
+        let [head, effects] = [0, 1].map(|line| text.lines().nth(line).unwrap_or_default());
         let numbers: Vec<f64> = head.split(' ').filter_map(|n| n.parse().ok()).collect();
-        if numbers.len() < 5 {
+        let arm = effects.split(' ').next().unwrap_or_default();
+        if head.starts_with("# failed") || numbers.len() < 5 {
             failed += 1;
             continue;
         }
-        let held = text.lines().filter_map(|line| line.strip_prefix("held,"));
-        let rows: Vec<Vec<f64>> = held
-            .map(|line| line.split(',').filter_map(|n| n.parse().ok()).collect())
-            .collect();
-        let motion = Motion {
-            rate_hz: (rows.len() - 1) as f64 / (rows[rows.len() - 1][0] - rows[0][0]),
-            q: matrix(&rows, 1),
-            qd: matrix(&rows, 2),
-            qdd: DMatrix::zeros(rows.len(), 4),
-            tau: DMatrix::zeros(rows.len(), 4),
-            independent_fraction: 1.0,
-            cutoff_hz: None,
-            start_s: rows[0][0],
-            torque_delay_s: 0.0,
-            masks: Vec::new(),
+        let description = Description::asset(arm)?;
+        let interval = with_dof!(description.dof(), N => interval::<N>(&description, &text))?;
+        let interval = interval.map_err(|error| wrong(&path, &error))?;
+        let groups = match seed >= IDEAL {
+            true => vec!["ideal".to_owned()],
+            false => {
+                let chosen = CHOSEN_ON.iter().any(|seeds| seeds.contains(&seed));
+                let used = if chosen { "used" } else { "not used" };
+                let all = "with effects".to_owned();
+                vec![all, format!("{used} to choose the factor"), arm.to_owned()]
+            }
         };
-        let residuals = matrix(&rows, 3);
-        let interval = error_interval(&config, &[0, 1, 2, 3], &[(&motion, &residuals)], 5.0);
-        let interval = interval.ok_or("no joint moves the tip")?;
-        ratios[usize::from(seed >= IDEAL)].push(interval.upper_m / numbers[1]);
-    }
-    for (name, mut ratios) in ["with effects", "ideal"].into_iter().zip(ratios) {
-        ratios.sort_by(f64::total_cmp);
-        let covered = ratios.iter().filter(|r| **r >= 1.0).count();
-        if let (Some(min), Some(median)) = (ratios.first(), ratios.get(ratios.len() / 2)) {
-            println!(
-                "{name}: {} runs, covered {covered}, upper bound over error: median {median:.2}, least {min:.2}, tenth \
-                 {:.2}",
-                ratios.len(),
-                ratios[ratios.len() / 10]
-            );
+        for group in groups {
+            let interval = interval.clone();
+            let error_m = numbers[1];
+            judged
+                .entry(group)
+                .or_default()
+                .push(Judged { error_m, interval });
         }
     }
-    println!("{failed} runs ended by a fault before the model could be used");
+    println!(
+        "| | runs | error at most the upper bound | error below the lower bound | upper bound over error, median | least | tenth |"
+    );
+    println!("|---|---|---|---|---|---|---|");
+    for (name, runs) in &judged {
+        print_row(name, runs);
+    }
+    println!("{failed} runs gave no model or no tracking, most by a fault during the excitation");
     Ok(())
+}
+
+fn wrong(path: &Path, error: &dyn std::fmt::Display) -> String {
+    format!("{}: {error}", path.display())
 }

@@ -4,19 +4,22 @@
 //! ```text
 //! cargo run --release -p supple-experiment --example verdict_runs -- FOLDER FIRST LAST
 //! ```
-//! For each seed it writes `FOLDER/SEED.csv`: a line with the measured and the formerly predicted tracking errors, then
-//! the residuals of the model over the held-out motion and the slow one. Finished seeds are skipped, so that it resumes.
+//! For each seed it writes `FOLDER/SEED.csv`: a line with the measured and the formerly predicted tracking errors, one with the
+//! name of the arm and the effects, one with the friction found, then what the controller's feed-forward
+//! leaves of the torques in the excitation, the slow motion and the held-out one. Finished seeds are skipped, so that it resumes.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use supple_experiment::calibrate::{plant_of, with_ripple_torque};
+use supple_experiment::procedure::read_excitations;
 use supple_experiment::{
-    Calibration, calibrate, predict_tracking_error, track_with_identified_model,
+    Calibration, calibrate, feedforward_residual_nm, predict_tracking_error,
+    track_with_identified_model,
 };
-use supple_ident::{Motion, Preparation, read_mcap};
-use supple_model::Description;
+use supple_ident::{Motion, Preparation};
+use supple_model::{Description, with_dof};
 use supple_plant::PlantOptions;
 
 /// Samples per second of the written residuals.
@@ -24,6 +27,9 @@ const RATE_HZ: f64 = 25.0;
 
 /// Seeds from here on are those of ideal plants.
 const IDEAL: u64 = 10_000;
+
+/// Arms of the seeds, in turn.
+const ARMS: [&str; 6] = ["wam4", "wam4", "paper3", "wam4", "wam4", "wam7"];
 
 /// Effects of the set `realistic`, each left out in half of the combinations and otherwise from a third to three times its
 /// size.
@@ -53,8 +59,11 @@ fn options(seed: u64) -> PlantOptions {
     chosen
 }
 
-fn one(seed: u64, folder: &Path) -> Result<String, Box<dyn std::error::Error>> {
-    let description = Description::asset("wam4")?;
+fn one<const N: usize>(
+    description: &Description,
+    seed: u64,
+    folder: &Path,
+) -> Result<String, Box<dyn std::error::Error>> {
     let logs = folder.join(format!("logs-{seed}"));
     std::fs::create_dir_all(&logs)?;
     let calibration = Calibration {
@@ -63,8 +72,8 @@ fn one(seed: u64, folder: &Path) -> Result<String, Box<dyn std::error::Error>> {
         log_dir: Some(logs.clone()),
         ..Calibration::new(seed)
     };
-    let found = calibrate::<4>(&description, &calibration, &mut |_| {})?;
-    let plant = plant_of::<4>(&description, &calibration)?;
+    let found = calibrate::<N>(description, &calibration, &mut |_| {})?;
+    let plant = plant_of::<N>(description, &calibration)?;
     let tracking = track_with_identified_model(&found.description, &plant)?;
     let tracking = tracking.ok_or("out of reach")?;
     let predicted = predict_tracking_error(&found.description, &found.fit, 2)?;
@@ -77,6 +86,7 @@ fn one(seed: u64, folder: &Path) -> Result<String, Box<dyn std::error::Error>> {
         predicted.worst_m.unwrap_or(f64::INFINITY),
         found.validation.total_relative
     );
+    write!(text, "{} ", description.name())?;
     for (option, value) in calibration.plant.values() {
         if let Some(value) = value {
             write!(text, "{}={value:.4} ", option.name)?;
@@ -88,30 +98,31 @@ fn one(seed: u64, folder: &Path) -> Result<String, Box<dyn std::error::Error>> {
         write!(text, "{} ", f.coulomb_nm)?;
     }
     text.push('\n');
-    let config = description.config::<4>()?;
+    let config = description.config::<N>()?;
     let motor_from_joint = *supple_core::Controller::new(config)?.motor_from_joint();
     let file = std::fs::read_dir(&logs)?
         .filter_map(Result::ok)
         .map(|entry| entry.path())
         .find(|path| path.extension().is_some_and(|end| end == "mcap"))
         .ok_or("no log")?;
-    let stretches = read_mcap::<4>(&file)?;
-    // Excitation, slow motion, held-out excitation.
-    for (name, index) in [("slow", 1), ("held", 2)] {
-        let log = with_ripple_torque(&stretches[index], &found.ripple, &motor_from_joint);
+    let excitations = read_excitations::<N>(&file)?;
+    let identified = found.description.config::<N>()?;
+    let joints: Vec<usize> = (0..N).collect();
+    for (name, log) in ["excitation", "slow", "held"].iter().zip(&excitations) {
+        let log = with_ripple_torque(log, &found.ripple, &motor_from_joint);
         let preparation: Preparation = found.fit.preparation;
-        let (motion, _) = Motion::prepare(&log, 4, &[0, 1, 2, 3], &preparation)?;
-        let predicted = found.fit.predict_motion(&motion)?;
+        let (motion, _) = Motion::prepare(&log, N, &joints, &preparation)?;
+        let residual_nm = feedforward_residual_nm(&identified, &joints, &motion);
         let every = (motion.rate_hz / RATE_HZ).round().max(1.0) as usize;
         for i in (0..motion.samples()).step_by(every) {
             write!(text, "{name},{:.3}", motion.time_s(i))?;
-            for j in 0..4 {
+            for j in 0..N {
                 write!(
                     text,
                     ",{:.4},{:.4},{:.4}",
                     motion.q[(i, j)],
                     motion.qd[(i, j)],
-                    motion.tau[(i, j)] - predicted[(i, j)]
+                    residual_nm[(i, j)]
                 )?;
             }
             text.push('\n');
@@ -133,9 +144,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         if path.exists() {
             continue;
         }
-        let text = one(seed, &folder).unwrap_or_else(|error| format!("# failed: {error}\n"));
+        let description = Description::asset(ARMS[(seed % ARMS.len() as u64) as usize])?;
+        let text = with_dof!(description.dof(), N => one::<N>(&description, seed, &folder))?;
+        let text =
+            text.unwrap_or_else(|error| format!("# failed: {} {error}\n", description.name()));
         std::fs::write(&path, text)?;
-        println!("{seed}");
+        println!("{seed} {}", description.name());
     }
     Ok(())
 }

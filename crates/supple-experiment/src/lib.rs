@@ -83,7 +83,10 @@ pub use quadrant::{Edge, EdgeMeter};
 pub use realistic::{Realistic, SeedFailure, SeedFault};
 pub use record::Recorder;
 pub use request_sequence::{Recording, RequestSequence, Step, StepCallback};
-pub use residual_error::{ErrorInterval, error_interval, structure_nm};
+pub use residual_error::{
+    ErrorInterval, NO_INTERVAL, SinusoidRegion, error_interval, error_interval_of,
+    feedforward_residual_nm,
+};
 pub use rig::{Cycle, Rig};
 pub use ripple::identify_ripple;
 pub use run::{CycleCallback, FaultEnd, Plan, Run, run};

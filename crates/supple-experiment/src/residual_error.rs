@@ -1,37 +1,48 @@
-//! Tracking error that the residuals of a model imply, from logs that were not fitted.
+//! Tracking error that the torques of a motion imply which a controller's feed-forward leaves.
 //!
-//! A model whose torques are wrong by `r` lets the tip deviate until the stiffness holds the difference: by `F / K` with
-//! the force `F` at the tip that has the torques `J' F = r` at the joints that move the tip. What the residual is made of
-//! does not matter: noise averages out over the time that the tip needs to move, structure over joint angle and direction
-//! does not. So the residuals are averaged over cells of angle and direction of each joint first; what the cells keep
-//! beyond their own noise counts.
+//! A controller whose feed-forward is wrong by `r` lets the tip deviate until the stiffness holds the difference: by `F / K`
+//! with the force `F` at the tip that has the torques `J' F = r` at the joints that move the tip. Which residuals count depends
+//! on what the arm does later: those of the fast motion that excites an arm come from its elasticity and inertia, those near a
+//! reversal from friction that has not turned round yet, and neither acts in a slow motion elsewhere. So the residuals are
+//! averaged over the samples in which the arm is near the poses and speeds of the sinusoid, and a joint slides, separately for
+//! both directions: noise averages out, errors of gravity and friction stay.
 //!
 //! The factor to the upper bound is that which covers nine tenths of the calibrations of simulated arms with random effects
 //! of real ones (`docs/verdict.md`).
 
-use crate::start::active_joints;
+use crate::tracking_prediction::GOOD_M;
 use nalgebra::DMatrix;
-use serde::Serialize;
-use supple_core::dynamics::jacobian;
+use serde::{Deserialize, Serialize};
+use supple_core::dynamics::{Terms, jacobian, terms};
+use supple_core::learned::LearnedBounds;
+use supple_core::learned_torque::{LearnedAtPose, learned_torque_nm};
+use supple_core::math::Vector3;
 use supple_core::{Config, Vector};
+use supple_ident::Motion;
 use supple_ident::estimate::pseudo_inverse;
-use supple_ident::{DMatrix as Matrix, Motion};
+use supple_model::reach::{REACH_CHECK_STEP_S, active_joints, follow, start_pose};
+use supple_model::{Description, ModelError};
 
-/// Cells of angle over the range of a joint.
-const CELLS: usize = 6;
-/// Fewest samples of a cell.
-const MIN_SAMPLES: usize = 8;
-/// Samples that one independent one stands for: residuals are smooth.
-const CORRELATED_S: f64 = 0.24;
-/// Number of poses at which forces are computed.
-const POSES: usize = 200;
-/// Upper bound over the estimate.
-pub const UPPER_FACTOR: f64 = 1.0;
-/// Lower bound over the estimate.
-pub const LOWER_FACTOR: f64 = 0.1;
+/// Distance from the poses of the sinusoid, and of a speed beyond its speeds, at which a sample counts 0.6 times.
+const NEAR_RAD: f64 = 0.4;
+const NEAR_RAD_PER_S: f64 = 0.2;
+/// Time that the samples of each direction must represent \[s\]; the distances grow by this factor, up to a limit, until they do.
+const MIN_TIME_S: f64 = 0.6;
+const DISTANCE_GROWTH: f64 = 1.3;
+const MAX_DISTANCE_FACTOR: f64 = 20.0;
+/// Speed, and travel since the last reversal, above which a joint slides.
+const SLIDING_RAD_PER_S: f64 = 0.06;
+const SLIDING_RAD: f64 = 0.03;
+/// Upper and lower bound over the estimate.
+const UPPER_FACTOR: f64 = 1.2;
+const LOWER_FACTOR: f64 = 0.1;
 
-/// Interval that contains the tracking error in nine of ten cases.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// What is said where there is no interval.
+pub const NO_INTERVAL: &str = "no interval at 5 N/m: a joint that moves the tip was not identified or slides too little in the logs that \
+                               were not fitted, or the sinusoid is out of reach";
+
+/// Interval of the tracking error; its upper bound is not exceeded in nine of ten cases.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ErrorInterval {
     /// Lower bound \[m\].
     pub lower_m: f64,
@@ -40,75 +51,178 @@ pub struct ErrorInterval {
     /// Log and joint that contribute most: index of the log, joint.
     pub worst: (usize, usize),
     /// Residual of each moving joint that counts, in the worst log \[N m\].
-    pub structure_nm: Vec<f64>,
+    pub residual_nm: Vec<f64>,
 }
 
-/// RMS over cells of angle and direction of the mean residual, without what noise leaves of it \[N m\].
-///
-/// `residual` belongs to joint `joint` and has one value for each sample of `motion`.
-pub fn structure_nm(motion: &Motion, joint: usize, residual: &[f64]) -> f64 {
-    let angles = motion.q.column(joint);
-    let (low, high) = (angles.min(), angles.max());
-    let width = ((high - low) / CELLS as f64).max(f64::MIN_POSITIVE);
-    let mut cells = vec![[0.0_f64; 3]; 2 * CELLS];
-    for (i, r) in residual.iter().enumerate() {
-        if !motion.used(i, joint) {
-            continue;
-        }
-        let cell = (((angles[i] - low) / width) as usize).min(CELLS - 1);
-        let forward = usize::from(motion.qd[(i, joint)] > 0.0);
-        let sums = &mut cells[2 * cell + forward];
-        sums[0] += 1.0;
-        sums[1] += r;
-        sums[2] += r * r;
+impl ErrorInterval {
+    /// What the model is good for, in words; `joint` names the joint that contributes most.
+    pub fn verdict(&self, stiffness_n_per_m: f64, joint: &str) -> String {
+        let good = match self.upper_m <= GOOD_M {
+            true => "good",
+            false => "not good",
+        };
+        format!(
+            "{good} for {stiffness_n_per_m} N/m: the torques that the feed-forward leaves allow a tracking error of {:.1} to \
+             {:.1} mm (90 %); {joint} counts most",
+            1e3 * self.lower_m,
+            1e3 * self.upper_m
+        )
     }
-    let independent = 1.0 / (CORRELATED_S * motion.rate_hz).max(1.0);
-    let (mut count, mut square) = (0.0, 0.0);
-    for [n, sum, squares] in cells {
-        if n >= MIN_SAMPLES as f64 {
-            let mean = sum / n;
-            let noise = (squares / n - mean * mean).max(0.0) / (n * independent).max(1.0);
-            count += n;
-            square += n * (mean * mean - noise).max(0.0);
-        }
-    }
-    (square / f64::max(count, 1.0)).sqrt()
 }
 
-/// The interval of the tracking error at a stiffness, from held-out motions and their residuals, (samples, moving joints);
-/// the worst motion decides. `None` without motions, or if no joint that moves the tip is among `moving`.
+/// Poses and speeds of the sinusoid at which the paper's arm is tracked.
+#[derive(Clone, Debug)]
+pub struct SinusoidRegion<const N: usize> {
+    lower_rad: Vector<N>,
+    upper_rad: Vector<N>,
+    max_rad_per_s: Vector<N>,
+    active: Vec<usize>,
+    /// Force at the tip for each newton metre at an active joint, RMS over the poses \[1/m\].
+    force_n_per_nm: Vec<f64>,
+}
+
+impl<const N: usize> SinusoidRegion<N> {
+    /// Of this arm; `None` if it cannot reach the sinusoid or no joint moves the tip.
+    ///
+    /// # Errors
+    /// If the description does not fit `N` joints.
+    pub fn new(description: &Description) -> Result<Option<Self>, ModelError> {
+        let config = description.config::<N>()?;
+        let (trajectory, duration_s) = description.paths().sinusoid(1.0);
+        let poses = start_pose(&config, &trajectory, duration_s)
+            .and_then(|start_rad| follow(&config, &start_rad, &trajectory, duration_s));
+        Ok(poses.ok().and_then(|poses| Self::of_poses(&config, &poses)))
+    }
+
+    fn of_poses(config: &Config<N>, poses: &[Vector<N>]) -> Option<Self> {
+        let active = active_joints(config);
+        let (mut lower_rad, mut upper_rad) = (*poses.first()?, *poses.first()?);
+        let mut max_rad_per_s = Vector::<N>::zeros();
+        let mut squares = vec![0.0; active.len()];
+        for (i, q) in poses.iter().enumerate() {
+            (lower_rad, upper_rad) = (lower_rad.inf(q), upper_rad.sup(q));
+            if i > 0 {
+                max_rad_per_s = max_rad_per_s.sup(&((q - poses[i - 1]).abs() / REACH_CHECK_STEP_S));
+            }
+            let columns = jacobian(&config.arm, q);
+            let transposed =
+                DMatrix::from_fn(active.len(), 3, |a, axis| columns[(axis, active[a])]);
+            let inverse = pseudo_inverse(&transposed, 1e-6).ok()?;
+            for (square, column) in squares.iter_mut().zip(inverse.column_iter()) {
+                *square += column.norm_squared() / poses.len() as f64;
+            }
+        }
+        Some(SinusoidRegion {
+            lower_rad,
+            upper_rad,
+            max_rad_per_s,
+            active,
+            force_n_per_nm: squares.into_iter().map(f64::sqrt).collect(),
+        })
+    }
+
+    /// Square of the distance of a sample from the region, one for [`NEAR_RAD`] and [`NEAR_RAD_PER_S`].
+    fn squared_distance(&self, motion: &Motion, sample: usize) -> f64 {
+        let beyond =
+            |value: f64, lower: f64, upper: f64| (lower - value).max(value - upper).max(0.0);
+        let angle = |j: usize| {
+            beyond(motion.q[(sample, j)], self.lower_rad[j], self.upper_rad[j]) / NEAR_RAD
+        };
+        let speed = |j: usize| {
+            beyond(motion.qd[(sample, j)].abs(), 0.0, self.max_rad_per_s[j]) / NEAR_RAD_PER_S
+        };
+        (0..N).map(|j| angle(j).powi(2) + speed(j).powi(2)).sum()
+    }
+}
+
+/// Residual of a joint in a motion that counts near the sinusoid \[N m\]: of the means of both directions, their mean and half
+/// their difference, which friction makes, as squares. `None` if the joint does not slide in both directions for
+/// [`MIN_TIME_S`].
+fn residual_nm(
+    motion: &Motion,
+    squared_distance: &[f64],
+    joint: usize,
+    residual: &[f64],
+) -> Option<f64> {
+    let slides = sliding(motion, joint);
+    let mut factor = 1.0;
+    loop {
+        let mut sums = [[0.0_f64; 2]; 2];
+        for (i, r) in residual.iter().enumerate().filter(|(i, _)| slides[*i]) {
+            let weight = (-0.5 * squared_distance[i] / (factor * factor)).exp();
+            let of_direction = &mut sums[usize::from(motion.qd[(i, joint)] > 0.0)];
+            of_direction[0] += weight;
+            of_direction[1] += weight * r;
+        }
+        let time_s = sums[0][0].min(sums[1][0]) / motion.rate_hz;
+        if time_s >= MIN_TIME_S {
+            let [backward, forward] = sums.map(|[weight, sum]| sum / weight);
+            return Some((0.5 * (forward + backward)).hypot(0.5 * (forward - backward)));
+        }
+        if factor > MAX_DISTANCE_FACTOR {
+            return None;
+        }
+        factor *= DISTANCE_GROWTH;
+    }
+}
+
+/// Whether a joint slides, for each sample, and its torque is used.
+fn sliding(motion: &Motion, joint: usize) -> Vec<bool> {
+    let (mut travel_rad, mut forward) = (0.0, None);
+    let slides = |i: usize| {
+        let speed = motion.qd[(i, joint)];
+        if forward.replace(speed > 0.0) != Some(speed > 0.0) {
+            travel_rad = 0.0;
+        }
+        travel_rad += speed.abs() / motion.rate_hz;
+        speed.abs() > SLIDING_RAD_PER_S && travel_rad >= SLIDING_RAD && motion.used(i, joint)
+    };
+    (0..motion.samples()).map(slides).collect()
+}
+
+/// The interval of the tracking error of the sinusoid at a stiffness, from motions and what the feed-forward leaves of their
+/// torques, (samples, moving joints); the worst motion decides. `None` without motions, if not all joints that move the tip are
+/// among `moving`, or if there is no motion in which each of them slides in both directions for some time.
 pub fn error_interval<const N: usize>(
-    config: &Config<N>,
+    region: &SinusoidRegion<N>,
     moving: &[usize],
-    held_out: &[(&Motion, &Matrix<f64>)],
+    held_out: &[(&Motion, &DMatrix<f64>)],
     stiffness_n_per_m: f64,
 ) -> Option<ErrorInterval> {
+    let rows: Option<Vec<usize>> = region
+        .active
+        .iter()
+        .map(|joint| moving.iter().position(|j| j == joint))
+        .collect();
+    let rows = rows?;
     let mut worst: Option<ErrorInterval> = None;
     for (log, (motion, residuals)) in held_out.iter().enumerate() {
-        let structure: Vec<f64> = moving
-            .iter()
-            .enumerate()
-            .map(|(row, &joint)| {
-                structure_nm(
-                    motion,
-                    joint,
-                    residuals.column(row).clone_owned().as_slice(),
-                )
-            })
+        let squared_distance: Vec<f64> = (0..motion.samples())
+            .map(|sample| region.squared_distance(motion, sample))
             .collect();
-        let lever = forces_per_nm(config, moving, motion)?;
-        let parts: Vec<f64> = structure
-            .iter()
-            .zip(&lever)
-            .map(|(r, l)| (r * l).powi(2))
-            .collect();
-        let error_m = parts.iter().sum::<f64>().sqrt() / stiffness_n_per_m;
-        let (row, _) = parts.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+        let of_joint = |(&row, &joint): (&usize, &usize)| {
+            let column = residuals.column(row).clone_owned();
+            residual_nm(motion, &squared_distance, joint, column.as_slice())
+        };
+        let found: Option<Vec<f64>> = rows.iter().zip(&region.active).map(of_joint).collect();
+        let Some(found) = found else {
+            continue;
+        };
+        let mut residual_nm = vec![0.0; moving.len()];
+        let mut parts = Vec::new();
+        for (i, &row) in rows.iter().enumerate() {
+            residual_nm[row] = found[i];
+            let force_n = found[i] * region.force_n_per_nm[i];
+            parts.push((region.active[i], force_n * force_n));
+        }
+        let squares: f64 = parts.iter().map(|part| part.1).sum();
+        let error_m = squares.sqrt() / stiffness_n_per_m;
+        let (joint, _) = *parts.iter().max_by(|a, b| a.1.total_cmp(&b.1))?;
         let interval = ErrorInterval {
             lower_m: LOWER_FACTOR * error_m,
             upper_m: UPPER_FACTOR * error_m,
-            worst: (log, moving[row]),
-            structure_nm: structure,
+            worst: (log, joint),
+            residual_nm,
         };
         if worst.as_ref().is_none_or(|w| interval.upper_m > w.upper_m) {
             worst = Some(interval);
@@ -117,38 +231,62 @@ pub fn error_interval<const N: usize>(
     worst
 }
 
-/// Force at the tip for each newton metre at a moving joint, the median over poses \[1/m\]; zero for joints outside the
-/// law.
-fn forces_per_nm<const N: usize>(
+/// The interval of the tracking error of the sinusoid at a stiffness for a controller with this model, from motions that were
+/// not fitted. As [`error_interval`]; `None` also if the arm cannot reach the sinusoid.
+///
+/// # Errors
+/// If the description does not fit `N` joints.
+pub fn error_interval_of<const N: usize>(
+    identified: &Description,
+    moving: &[usize],
+    held_out: &[&Motion],
+    stiffness_n_per_m: f64,
+) -> Result<Option<ErrorInterval>, ModelError> {
+    let Some(region) = SinusoidRegion::<N>::new(identified)? else {
+        return Ok(None);
+    };
+    let config = identified.config::<N>()?;
+    let residual = |motion: &&Motion| feedforward_residual_nm(&config, moving, motion);
+    let residuals: Vec<_> = held_out.iter().map(residual).collect();
+    let pairs: Vec<_> = held_out.iter().copied().zip(&residuals).collect();
+    Ok(error_interval(&region, moving, &pairs, stiffness_n_per_m))
+}
+
+/// Torques of the joints `moving` in a motion beyond the feed-forward of a controller with the configuration `config`, (samples,
+/// moving joints) \[N m\].
+///
+/// The feed-forward is that of the controller, not that of a fit: a fit has terms that a controller takes at their mean, such as
+/// friction that grows with the load.
+pub fn feedforward_residual_nm<const N: usize>(
     config: &Config<N>,
     moving: &[usize],
     motion: &Motion,
-) -> Option<Vec<f64>> {
-    let active = active_joints(config);
-    let every = (motion.samples() / POSES).max(1);
-    let mut all = vec![Vec::new(); active.len()];
-    for i in (0..motion.samples()).step_by(every) {
-        let q = Vector::<N>::from_fn(|j, _| motion.q[(i, j)]);
-        let columns = jacobian(&config.arm, &q);
-        let transposed = DMatrix::from_fn(active.len(), 3, |a, axis| columns[(axis, active[a])]);
-        let Ok(inverse) = pseudo_inverse(&transposed, 1e-6) else {
-            continue;
-        };
-        for (a, sizes) in all.iter_mut().enumerate() {
-            sizes.push(inverse.column(a).norm());
+) -> DMatrix<f64> {
+    let bounds = LearnedBounds::new(&config.friction, &config.limits.joint_torque_nm);
+    let mut residual = DMatrix::zeros(motion.samples(), moving.len());
+    let mut at_pose = Terms::default();
+    for sample in 0..motion.samples() {
+        let at = |m: &DMatrix<f64>| Vector::<N>::from_fn(|j, _| m[(sample, j)]);
+        let (encoder, qd, qdd) = (at(&motion.q), at(&motion.qd), at(&motion.qdd));
+        terms(&config.arm, &encoder, &qd, &mut at_pose);
+        let q = encoder - config.compliance_rad_per_nm.component_mul(&at_pose.gravity);
+        terms(&config.arm, &q, &qd, &mut at_pose);
+        let friction = Vector::from_fn(|j, _| config.friction[j].torque_nm(qd[j]));
+        let model = at_pose.mass_matrix * qdd + at_pose.coriolis_gravity + friction;
+        let learned = LearnedAtPose::new(
+            &config.learned,
+            &config.friction,
+            &config.limits,
+            &config.arm.gravity(),
+            &q,
+            &at_pose,
+            &Vector3::zeros(),
+        );
+        let change = learned.torque_nm(&config.learned, &config.friction, &qd, None, 1.0);
+        let feedforward = model + learned_torque_nm(&config.learned, &bounds, &model, &change);
+        for (row, &joint) in moving.iter().enumerate() {
+            residual[(sample, row)] = motion.tau[(sample, joint)] - feedforward[joint];
         }
     }
-    if all.iter().any(Vec::is_empty) || active.is_empty() {
-        return None;
-    }
-    let median = |sizes: &mut Vec<f64>| {
-        sizes.sort_by(f64::total_cmp);
-        sizes[sizes.len() / 2]
-    };
-    let medians: Vec<f64> = all.iter_mut().map(median).collect();
-    let lever = |joint: &usize| {
-        let place = active.iter().position(|j| j == joint);
-        place.map_or(0.0, |place| medians[place])
-    };
-    Some(moving.iter().map(lever).collect())
+    residual
 }

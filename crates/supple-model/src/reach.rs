@@ -8,7 +8,7 @@ use supple_core::task::Task;
 use supple_core::{Config, Trajectory, Vector};
 
 /// Time between the points at which the reach is checked \[s\].
-const REACH_CHECK_STEP_S: f64 = 0.05;
+pub const REACH_CHECK_STEP_S: f64 = 0.05;
 /// Fractions of the joint ranges at which the search for a start pose begins.
 const SEEDS: [f64; 3] = [0.3, 0.5, 0.7];
 /// Evenly spread poses at which it begins otherwise.
@@ -50,7 +50,7 @@ pub fn start_pose<const N: usize>(
     let mut failure = None;
     if let Some(start_rad) = highest {
         match follow(config, &start_rad, trajectory, duration_s) {
-            Ok(()) => return Ok(start_rad),
+            Ok(_) => return Ok(start_rad),
             Err(out_of_reach) => failure = Some(out_of_reach),
         }
     }
@@ -63,7 +63,7 @@ pub fn start_pose<const N: usize>(
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     for (_, start_rad) in found {
         match follow(config, &start_rad, trajectory, duration_s) {
-            Ok(()) => return Ok(start_rad),
+            Ok(_) => return Ok(start_rad),
             Err(out_of_reach) => failure = failure.or(Some(out_of_reach)),
         }
     }
@@ -111,7 +111,8 @@ fn highest_elbow<const N: usize>(
     (best.map(|(_, found)| found.position_rad), nearest)
 }
 
-/// Checks that the arm can follow a trajectory from a pose, between its soft stops.
+/// Checks that the arm can follow a trajectory from a pose, between its soft stops. Returns the joint angles every
+/// [`REACH_CHECK_STEP_S`], from the start \[rad\].
 ///
 /// # Errors
 /// [`OutOfReach`] is the first point out of reach.
@@ -120,9 +121,10 @@ pub fn follow<const N: usize>(
     start_rad: &Vector<N>,
     trajectory: &Trajectory,
     duration_s: f64,
-) -> Result<(), OutOfReach> {
+) -> Result<Vec<Vector<N>>, OutOfReach> {
     let steps = (duration_s / REACH_CHECK_STEP_S).ceil() as u32;
     let mut q = *start_rad;
+    let mut poses = vec![q];
     for k in 1..=steps {
         let time_s = f64::from(k) * REACH_CHECK_STEP_S;
         let point_m = trajectory.at(time_s).position;
@@ -135,8 +137,9 @@ pub fn follow<const N: usize>(
             });
         }
         q = there.position_rad;
+        poses.push(q);
     }
-    Ok(())
+    Ok(poses)
 }
 
 /// Joint angles that bring the tip to a point, from a seed \[rad\].

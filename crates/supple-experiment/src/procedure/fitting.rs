@@ -4,6 +4,8 @@ use super::error::ProcedureError;
 use super::progress::FitQuality;
 use crate::breakaway::JointBreakaway;
 use crate::calibrate::{FitOptions, SLOW_RAD_PER_S, identify_with, with_ripple_torque};
+use crate::residual_error::{ErrorInterval, error_interval_of};
+use crate::scenario::STIFFNESS_N_PER_M;
 use nalgebra::DMatrix;
 use std::path::Path;
 use supple_core::controller::Mode;
@@ -160,22 +162,27 @@ pub fn fit_first<const N: usize>(
         &fit_options(model),
         min_fitted_rad_per_s(&logs),
     )?;
-    let quality = quality(&config, &fit, &prepared(&held_out, &fit)?)?;
+    let held_out = prepared(&held_out, &fit)?;
+    let quality = quality(&config, &fit, &held_out)?;
     let is_better = quality.validation_relative < quality.validation_relative_before;
     if !is_better {
         return Ok(None);
     }
     let found = fit.description(model, None)?;
-    Ok(found.completed().is_ok().then_some((found, quality)))
+    if found.completed().is_err() {
+        return Ok(None);
+    }
+    Ok(Some((found, quality)))
 }
 
 /// Fits a model to `logs` (excitations and slow motions) and the torque ripple to `constant_speed`, and validates both on the
-/// motion `validation`. The collision thresholds come from the residuals of `logs`, `validation` and `others`, such as moves.
+/// motion `validation`. The joints that `start` holds are held in the tracking that is judged. The collision thresholds come from the residuals of `logs`, `validation` and `others`, such as moves.
 ///
 /// # Errors
 /// A log that cannot be used.
 pub fn fit_all<const N: usize>(
     model: &Description,
+    start: &Description,
     logs: &[Log],
     constant_speed: &[Log],
     validation: &Log,
@@ -187,8 +194,9 @@ pub fn fit_all<const N: usize>(
     let motor_from_joint = *supple_core::Controller::new(config)?.motor_from_joint();
     let validation = with_ripple_torque(validation, &ripple, &motor_from_joint);
     let validation = prepared(&validation, &fit)?;
-    let quality = quality(&config, &fit, &validation)?;
+    let mut quality = quality(&config, &fit, &validation)?;
     let described = fit.description(model, Some(&ripple))?;
+    quality.interval_at_5_n_per_m = interval(&fit, &described, start, &validation);
     let mut validations = vec![fit.validate_motion(&validation)?];
     for log in logs.iter().chain(others) {
         let log = with_ripple_torque(log, &ripple, &motor_from_joint);
@@ -306,5 +314,21 @@ fn quality<const N: usize>(
         validation_relative_before: (error / torque.max(f64::MIN_POSITIVE)).sqrt(),
         validation_rms_nm: validation.rms_nm.clone(),
         verdict: validation.verdict(),
+        interval_at_5_n_per_m: None,
     })
+}
+
+/// Interval of the tracking error at 5 N/m of a controller with the model `described`, which holds the joints that `start` holds;
+/// `None` also for a model that no controller takes.
+fn interval<const N: usize>(
+    fit: &Fit<N>,
+    described: &Description,
+    start: &Description,
+    motion: &Motion,
+) -> Option<ErrorInterval> {
+    let described = described.with_held_joints_of(start).ok()?;
+    let moving = fit.columns.moving();
+    error_interval_of::<N>(&described, moving, &[motion], STIFFNESS_N_PER_M)
+        .ok()
+        .flatten()
 }

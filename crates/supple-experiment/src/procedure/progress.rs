@@ -4,6 +4,7 @@ use super::error::ProcedureError;
 use super::sweep::Sweep;
 use super::wiring::JointWiring;
 use crate::breakaway::JointBreakaway;
+use crate::residual_error::ErrorInterval;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::str::FromStr;
@@ -101,6 +102,10 @@ pub struct FitQuality {
     pub validation_rms_nm: Vec<f64>,
     /// Verdict of the identification.
     pub verdict: String,
+    /// Interval of the tracking error at 5 N/m that the validation motion allows the model of all motions; `None` for other models,
+    /// where there is no evidence, if the sinusoid is out of reach, and in files of older versions.
+    #[serde(default)]
+    pub interval_at_5_n_per_m: Option<ErrorInterval>,
 }
 
 /// Tracking of the sinusoid at 5 N/m.

@@ -5,7 +5,7 @@ use askama::Template;
 use serde::Serialize;
 use supple_cli::exit::Failure;
 use supple_experiment::scenario::STIFFNESS_N_PER_M;
-use supple_experiment::{ErrorInterval, GOOD_M, TrackingPrediction, error_interval};
+use supple_experiment::{ErrorInterval, NO_INTERVAL, TrackingPrediction, error_interval_of};
 use supple_ident::{DMatrix, Fit, Motion, Validation};
 use supple_model::Description;
 
@@ -47,8 +47,8 @@ pub struct Summary {
     pub verdict: String,
     /// Verdict for 5 N/m, as text.
     pub verdict_at_5_n_per_m: String,
-    /// Interval of the tracking error at 5 N/m from the held-out residuals; `None` if the joints that move the tip were not
-    /// identified.
+    /// Interval of the tracking error at 5 N/m from the held-out residuals; `None` without evidence or if the sinusoid is out of
+    /// reach.
     pub interval_at_5_n_per_m: Option<ErrorInterval>,
     /// Result of the trial runs in simulation, as text: what the uncertainty of the parameters alone would give.
     pub trial_runs: String,
@@ -305,16 +305,9 @@ fn over_angle<const N: usize>(input: &ReportInput<'_, N>, names: &[String]) -> V
 
 /// The interval of the tracking error at 5 N/m.
 fn interval<const N: usize>(input: &ReportInput<'_, N>) -> Option<ErrorInterval> {
-    let config = input.arm.config::<N>().ok()?;
+    let motions: Vec<_> = input.held_out.iter().map(|held_out| &held_out.1).collect();
     let moving = input.fit.columns.moving();
-    let mut residuals = Vec::new();
-    for (_, motion, _) in &input.held_out {
-        let predicted = input.fit.predict_motion(motion).ok()?;
-        let measured = motion.tau.select_columns(moving);
-        residuals.push((motion, measured - predicted));
-    }
-    let pairs: Vec<_> = residuals.iter().map(|(motion, r)| (*motion, r)).collect();
-    error_interval(&config, moving, &pairs, STIFFNESS_N_PER_M)
+    error_interval_of::<N>(input.arm, moving, &motions, STIFFNESS_N_PER_M).ok()?
 }
 
 /// Verdict at 5 N/m as text, from the held-out residuals.
@@ -324,20 +317,11 @@ fn at_5_n_per_m<const N: usize>(
     names: &[String],
 ) -> String {
     let Some(interval) = interval else {
-        return "no interval at 5 N/m: no joint that moves the tip was identified".to_owned();
+        return NO_INTERVAL.to_owned();
     };
-    let (lower, upper) = (1e3 * interval.lower_m, 1e3 * interval.upper_m);
     let (log, joint) = interval.worst;
-    let good = if interval.upper_m <= GOOD_M {
-        "good"
-    } else {
-        "not good"
-    };
-    format!(
-        "{good} for 5 N/m: the residuals that are not noise allow a tracking error of {lower:.1} to {upper:.1} mm (90 %); {} \
-         in {} counts most",
-        names[joint], input.held_out[log].0
-    )
+    let joint = format!("{} in {}", names[joint], input.held_out[log].0);
+    interval.verdict(STIFFNESS_N_PER_M, &joint)
 }
 
 #[derive(Template)]

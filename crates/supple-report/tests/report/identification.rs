@@ -203,7 +203,7 @@ fn a_calibration_prints_its_verdict_and_the_demo_with_its_model() {
     for words in [
         "breakaway of joint1",
         "ripple of motor 3: harmonic 6",
-        "for 5 N/m: the residuals",
+        "for 5 N/m: the torques that the feed-forward leaves allow",
         "sinusoid at 5 N/m with this model",
         "this is a simulation",
         "given plant: sinusoid at 5 N/m, RMS error",

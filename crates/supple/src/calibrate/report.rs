@@ -3,7 +3,9 @@
 use std::path::Path;
 use supple_cli::console::{print_json, print_line};
 use supple_cli::exit::Failure;
+use supple_experiment::NO_INTERVAL;
 use supple_experiment::procedure::CalibratedArm;
+use supple_experiment::scenario::STIFFNESS_N_PER_M;
 
 /// Prints the result.
 ///
@@ -34,6 +36,11 @@ pub fn print(found: &CalibratedArm, out: &Path, json: bool) -> Result<(), Failur
             100.0 * fit.validation_relative,
             fit.verdict
         ))?;
+        let verdict = fit.interval_at_5_n_per_m.as_ref().map(|interval| {
+            let joint = names.get(interval.worst.1).map_or("", String::as_str);
+            interval.verdict(STIFFNESS_N_PER_M, joint)
+        });
+        print_line(verdict.as_deref().unwrap_or(NO_INTERVAL))?;
     }
     if let Some(drift_rad) = progress.float_drift_rad {
         print_line(&format!(

@@ -64,6 +64,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         let [full, slow] = [StepName::FullPass, StepName::SlowMotion].map(file);
         let [first, constant] = [StepName::FirstPass, StepName::ConstantSpeed].map(file);
         let validation = self.log_file(StepName::ValidationMotion);
+        let start = self.start.clone();
         // Reading takes as long as fitting; the arm's telemetry must be read meanwhile.
         let (found, quality) = self.arm.meanwhile(move || {
             let (mut logs, mut others) = (Vec::new(), Vec::new());
@@ -79,7 +80,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
                 "validation-motion",
             )?
             .clone();
-            fitting::fit_all::<N>(&model, &logs, &constant, &validation, &others)
+            fitting::fit_all::<N>(&model, &start, &logs, &constant, &validation, &others)
         })??;
         self.say(&summary(&quality));
         let found = found
