@@ -93,14 +93,16 @@ fn friction_counts_as_much_as_a_constant_torque() {
 #[test]
 fn noise_averages_out_and_torques_near_reversals_do_not_count() {
     let slow = swinging(8.0);
-    let constant_m = upper_m(&slow, |_, _| 0.1);
+    let exact_m = upper_m(&slow, |_, _| 0.0);
     let noise_m = upper_m(&slow, |i, _| if i % 2 == 0 { 0.1 } else { -0.1 });
-    assert!(noise_m < 0.02 * constant_m, "{noise_m}");
+    assert!(noise_m < 1.1 * exact_m, "{noise_m} {exact_m}");
     let reversal_m = upper_m(&slow, |_, velocity| match velocity.abs() < 0.05 {
         true => 0.1,
         false => 0.0,
     });
-    assert_eq!(reversal_m, 0.0);
+    assert_eq!(reversal_m, exact_m);
+    // What friction leaves at reversals even with an exact model, 3 mm on the WAM.
+    assert!((0.0025..0.0035).contains(&exact_m), "{exact_m}");
 }
 
 #[test]
