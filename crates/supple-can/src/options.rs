@@ -90,7 +90,7 @@ fn speed(text: &str) -> Result<f64, String> {
         .map_err(|error| error.to_string())
 }
 
-/// Writes a budget to standard output. A closed pipe is not an error.
+/// Writes a budget to standard output. Errors are ignored: the exit code says whether the rate fits.
 pub fn print_budget(text: &dyn Display) {
     let _ = writeln!(std::io::stdout(), "{text}");
 }

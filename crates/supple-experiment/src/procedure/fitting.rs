@@ -162,21 +162,18 @@ pub fn fit_first<const N: usize>(
         &fit_options(model),
         min_fitted_rad_per_s(&logs),
     )?;
-    let held_out = prepared(&held_out, &fit)?;
-    let quality = quality(&config, &fit, &held_out)?;
+    let quality = quality(&config, &fit, &prepared(&held_out, &fit)?)?;
     let is_better = quality.validation_relative < quality.validation_relative_before;
     if !is_better {
         return Ok(None);
     }
     let found = fit.description(model, None)?;
-    if found.completed().is_err() {
-        return Ok(None);
-    }
-    Ok(Some((found, quality)))
+    Ok(found.completed().is_ok().then_some((found, quality)))
 }
 
 /// Fits a model to `logs` (excitations and slow motions) and the torque ripple to `constant_speed`, and validates both on the
-/// motion `validation`. The joints that `start` holds are held in the tracking that is judged. The collision thresholds come from the residuals of `logs`, `validation` and `others`, such as moves.
+/// motion `validation`. The joints that `start` holds are held in the tracking that is judged. The collision thresholds come from
+/// the residuals of `logs`, `validation` and `others`, such as moves.
 ///
 /// # Errors
 /// A log that cannot be used.
