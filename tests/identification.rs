@@ -417,8 +417,9 @@ fn a_realistic_arm_is_calibrated_step_by_step() {
     assert!(fit.validation_relative < 0.08, "{fit:?}");
     let sinusoid = progress.sinusoid.expect("in reach");
     assert_eq!(sinusoid.ended, None);
-    assert!(
-        sinusoid.learning_rms_m.is_some_and(|m| m < 0.02),
-        "{sinusoid:?}"
-    );
+    let [alone_m, learning_m] = [sinusoid.calibrated_rms_m, sinusoid.learning_rms_m];
+    // Without the springs, the tilt and the compliance that the fit finds, the model alone is 118 mm off.
+    assert!(alone_m.is_some_and(|m| m < 0.025), "{sinusoid:?}");
+    assert!(learning_m.is_some_and(|m| m < 0.005), "{sinusoid:?}");
+    assert_eq!(sinusoid.false_contacts, 0);
 }

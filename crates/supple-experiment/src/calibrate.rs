@@ -246,9 +246,6 @@ pub fn calibrate<const N: usize>(
     let (held_out, _) = Motion::prepare(&actual, N, &joints, &fit.preparation)?;
     let validation = fit.validate_motion(&held_out)?;
     let described = fit.description(description, Some(&ripple))?;
-    let described = described.with_compliance(&fit.compliance_rad_per_nm())?;
-    let learned = fit.learned(&described.config::<N>()?);
-    let described = described.with_learned(&learned, "identified with the model")?;
     let thresholds = fit.move_collision_nm(core::slice::from_ref(&validation), &nominal);
     let described = described.with_move_collision(&thresholds)?;
     let truth = model_accuracy(&described.config::<N>()?, &plant, calibration.seed);

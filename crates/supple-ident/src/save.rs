@@ -26,8 +26,9 @@ pub enum SaveError {
 }
 
 impl<const N: usize> Fit<N> {
-    /// `of` with the identified model: inertias of all links, rotors and friction of the moving joints. All
-    /// other text is unchanged. `ripple`, if given, replaces the motors' tables.
+    /// `of` with the identified model: inertias of all links, rotors and friction of the moving joints, and, if they were
+    /// identified, springs and tilt as `[learned]` and the compliance of the joints. Terms that `of` had learned are removed: the
+    /// fit explains the whole torque. All other text is unchanged. `ripple`, if given, replaces the motors' tables.
     ///
     /// # Errors
     /// [`SaveError`].
@@ -38,12 +39,22 @@ impl<const N: usize> Fit<N> {
     ) -> Result<Description, SaveError> {
         let error = 100.0 * self.training_relative;
         let source = format!("identified from logs; {error:.2} % of the torque left unexplained");
-        Ok(of.with_model(&IdentifiedModel {
+        let described = of.with_model(&IdentifiedModel {
             arm: &self.arm()?,
             friction: &self.friction_with(of.friction()),
             ripple,
             source: &source,
-        })?)
+        })?;
+        let mut described = described.without_learned()?;
+        let effects = self.columns.effects();
+        if effects.compliance {
+            described = described.with_compliance(&self.compliance_rad_per_nm())?;
+        }
+        if effects.springs || effects.tilt {
+            let learned = self.learned(&described.config::<N>()?);
+            described = described.with_learned(&learned, "identified with the model")?;
+        }
+        Ok(described)
     }
 
     /// Collision thresholds for the modes with stiff joint loops, from the residual of the model on held-out motions

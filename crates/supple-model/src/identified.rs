@@ -349,7 +349,7 @@ impl Description {
         Ok(document.to_string())
     }
 
-    fn document(&self) -> Result<DocumentMut, ModelError> {
+    pub(crate) fn document(&self) -> Result<DocumentMut, ModelError> {
         let document = self.toml().parse::<DocumentMut>();
         document.map_err(|error| syntax(TOML, error.to_string()))
     }

@@ -7,7 +7,6 @@ use serde::Serialize;
 use supple_core::Vector;
 use supple_core::learned::{JointMap, LearnedParameters, LearnedTerms, MAP_KNOTS};
 use supple_core::math::Vector3;
-use toml_edit::DocumentMut;
 
 /// The section of the TOML.
 #[derive(Serialize)]
@@ -152,9 +151,20 @@ impl Description {
         };
         let section = Section { learned: settings };
         let section = toml::to_string(&section).map_err(|error| syntax(error.to_string()))?;
-        let document = self.toml().parse::<DocumentMut>();
-        let mut document = document.map_err(|error| syntax(error.to_string()))?;
+        let document = self.without_learned()?;
+        Description::from_text(&format!("{}\n{section}", document.toml()), self.urdf())
+    }
+
+    /// Returns the same arm without `[learned]`; the other text of its TOML is kept.
+    ///
+    /// # Errors
+    /// Any [`ModelError`] of the edited text.
+    pub fn without_learned(&self) -> Result<Description, ModelError> {
+        if self.settings.learned.is_none() {
+            return Ok(self.clone());
+        }
+        let mut document = self.document()?;
         document.remove("learned");
-        Description::from_text(&format!("{document}\n{section}"), self.urdf())
+        Description::from_text(&document.to_string(), self.urdf())
     }
 }

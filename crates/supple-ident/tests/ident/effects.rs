@@ -1,7 +1,7 @@
 //! Effects beside links and joint friction: their columns against the arm that has them, and the travel of a reversal.
 
 use supple_core::dynamics::gravity;
-use supple_core::learned::MapWeights;
+use supple_core::learned::{LearnedTerms, MapWeights};
 use supple_core::nalgebra::Rotation3;
 use supple_core::{Arm, Config, Friction, Vector};
 use supple_ident::columns::Column;
@@ -85,11 +85,9 @@ fn motors_that_drive_several_joints_have_friction_of_their_own() {
     }
 }
 
-/// A fit of an arm with a hose finds its stiffness, and the terms of the controller are its torque.
-#[test]
-fn spring_is_found_and_becomes_a_map() {
-    let config = wam4();
-    let (rate_hz, samples, stiffness) = (100.0, 6000, 0.3);
+/// A motion of an arm with a spring over each joint.
+fn spring_motion(config: &Config<4>, stiffness: f64) -> Motion {
+    let (rate_hz, samples) = (100.0, 6000);
     // Two frequencies: with one alone the torque of a spring is that of an inertia.
     let angle = |i: usize, j: usize| {
         let t = i as f64 / rate_hz;
@@ -113,7 +111,7 @@ fn spring_is_found_and_becomes_a_map() {
             tau[(i, j)] = torque[j] + friction + stiffness * q[(i, j)];
         }
     }
-    let motion = Motion {
+    Motion {
         rate_hz,
         q,
         qd,
@@ -124,7 +122,14 @@ fn spring_is_found_and_becomes_a_map() {
         start_s: 0.0,
         torque_delay_s: 0.0,
         masks: Vec::new(),
-    };
+    }
+}
+
+/// A fit of an arm with a hose finds its stiffness, and the terms of the controller are its torque.
+#[test]
+fn spring_is_found_and_becomes_a_map() {
+    let (config, stiffness) = (wam4(), 0.3);
+    let motion = spring_motion(&config, stiffness);
     let options = Options {
         effects: Effects {
             springs: true,
@@ -150,6 +155,55 @@ fn spring_is_found_and_becomes_a_map() {
             );
         }
     }
+}
+
+/// The description of a fit has all that was identified, and no learned terms of the arm that it replaces: the fit explains the
+/// whole torque.
+#[test]
+fn description_of_a_fit_has_its_effects_and_no_older_ones() {
+    let nominal = Description::asset("wam4").unwrap();
+    let mut older = LearnedTerms::<4>::zero();
+    older.parameters.payload_kg = 0.05;
+    let learned = nominal.with_learned(&older, "an older run").unwrap();
+    let config = learned.config::<4>().unwrap();
+    assert_eq!(config.learned, older);
+    let motion = spring_motion(&config, 0.3);
+    let with_effects = Options {
+        effects: Effects {
+            springs: true,
+            tilt: true,
+            compliance: true,
+            motor_from_joint: None,
+        },
+        consistent_prior_weight: Some(1e-4),
+        ..Options::default()
+    };
+    let found = fit(
+        &config.arm,
+        core::slice::from_ref(&motion),
+        &ALL,
+        &with_effects,
+    )
+    .unwrap();
+    let described = found.description(&learned, None).unwrap();
+    let result = described.config::<4>().unwrap();
+    assert_eq!(result.learned, found.learned(&result));
+    assert!(result.learned.map[0].torque_nm[0].abs() > 0.1, "a spring");
+    assert_eq!(result.learned.parameters.payload_kg, 0.0);
+    let compliance = result.compliance_rad_per_nm;
+    assert_eq!(compliance.as_slice(), found.compliance_rad_per_nm());
+
+    let without = Options {
+        consistent_prior_weight: Some(1e-4),
+        ..Options::default()
+    };
+    let found = fit(&config.arm, &[motion], &ALL, &without).unwrap();
+    let described = found.description(&learned, None).unwrap();
+    assert_eq!(
+        described.config::<4>().unwrap().learned,
+        LearnedTerms::zero()
+    );
+    assert!(!described.toml().contains("[learned"));
 }
 
 /// Friction that turns round over a travel: the travel is found; friction by the sign of the velocity has none.
