@@ -7,6 +7,7 @@
 
 use crate::description::Description;
 use crate::error::ModelError;
+use crate::identified::put;
 use crate::poses::pose_rad;
 use core::f64::consts::FRAC_PI_2;
 use nalgebra::{DMatrix, SymmetricEigen};
@@ -14,6 +15,7 @@ use supple_core::config::Role;
 use supple_core::controller::ConfigError;
 use supple_core::dynamics::crba;
 use supple_core::{Config, Controller, Matrix, Vector};
+use toml_edit::value;
 
 /// Damping rate times delay that a lower control rate leaves: three quarters of the limit.
 const MARGIN: f64 = 0.75 * FRAC_PI_2;
@@ -40,6 +42,37 @@ impl Description {
             rates_times_delay(&controller)
                 .map(|(_, rate_times_delay)| (MARGIN / rate_times_delay).min(1.0))
         })
+    }
+
+    /// The same arm with the damping of gravity hold and the gains of held joints reduced in its TOML as far as its inertias and
+    /// the delay of the loop ask for, a margin included; and the shares that are left of both, 1 for what is unchanged.
+    ///
+    /// # Errors
+    /// Any [`ModelError`] of the edited text.
+    pub fn with_stable_damping<const N: usize>(
+        &self,
+    ) -> Result<(Description, [f64; 2]), ModelError> {
+        let shares = self.allowed_damping_shares::<N>();
+        if shares == [1.0; 2] {
+            return Ok((self.clone(), shares));
+        }
+        let mut document = self.document()?;
+        let mut reduced = self.clone();
+        reduced.reduce_damping(shares);
+        for (joint, of) in reduced.joints.iter().enumerate() {
+            let table = self.joint_table(&mut document, joint)?;
+            let damping = of.gains.hold_damping_nm_s_per_rad;
+            put(table, "hold_damping_nm_s_per_rad", damping.into());
+            let held = table
+                .get_mut("held")
+                .and_then(|held| held.as_table_like_mut());
+            if let (Some(held), Some(loops)) = (held, &of.held) {
+                held.insert("stiffness_nm_per_rad", value(loops.stiffness_nm_per_rad));
+                held.insert("damping_nm_s_per_rad", value(loops.damping_nm_s_per_rad));
+            }
+        }
+        let reduced = Description::from_text(&document.to_string(), self.urdf())?;
+        Ok((reduced, shares))
     }
 
     /// Multiplies the damping of gravity hold, and the gains of held joints, by these shares.
@@ -119,6 +152,44 @@ fn fastest<const N: usize>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A light rotor of a held joint leaves less of its gains, so that a controller takes the arm; other arms stay as they are.
+    #[test]
+    fn gains_of_a_held_joint_are_reduced_to_its_inertia() {
+        let wam4 = Description::asset("wam4").expect("built in");
+        let (same, shares) = wam4.with_stable_damping::<4>().expect("stable");
+        assert_eq!((same.toml(), shares), (wam4.toml(), [1.0; 2]));
+
+        let light = wam4
+            .toml()
+            .replace("armature_kg_m2 = 0.06691", "armature_kg_m2 = 0.01");
+        assert_ne!(light, wam4.toml());
+        let light = Description::from_text(&light, wam4.urdf()).expect("a description");
+        let refused = light.completed().expect_err("it shakes").to_string();
+        assert!(refused.contains("joint3"), "{refused}");
+        let (reduced, [_, held]) = light.with_stable_damping::<4>().expect("reduced");
+        assert!((0.1..0.9).contains(&held), "{held}");
+        reduced.completed().expect("a controller takes it");
+        let gains = |of: &Description| of.config::<4>().expect("four joints").roles[2];
+        match (gains(&light), gains(&reduced)) {
+            (
+                Role::Held {
+                    stiffness_nm_per_rad: before,
+                    damping_nm_s_per_rad: damped,
+                    ..
+                },
+                Role::Held {
+                    stiffness_nm_per_rad: after,
+                    damping_nm_s_per_rad: less,
+                    ..
+                },
+            ) => {
+                assert!((after - held * before).abs() < 1e-9);
+                assert!((less - held * damped).abs() < 1e-9);
+            }
+            other => panic!("{other:?}"),
+        }
+    }
 
     /// The built-in arms keep three quarters of the limit.
     #[test]

@@ -288,7 +288,7 @@ impl Description {
     }
 
     /// The table of a joint in the TOML, added if there is none.
-    fn joint_table<'a>(
+    pub(crate) fn joint_table<'a>(
         &self,
         document: &'a mut DocumentMut,
         joint: usize,
@@ -376,7 +376,7 @@ fn syntax(file: &str, message: String) -> ModelError {
 }
 
 /// Sets a key and removes the comment before it, which described the old value.
-fn put(table: &mut Table, key: &str, new: Value) {
+pub(crate) fn put(table: &mut Table, key: &str, new: Value) {
     table[key] = value(new);
     if let Some(mut key) = table.key_mut(key) {
         key.leaf_decor_mut().clear();

@@ -13,6 +13,9 @@ const TURNED_RAD_PER_S: f64 = 0.04;
 const MAX_SWING_S: f64 = 0.08;
 /// Times in a row that the peak grows until it is a fault.
 const GROWTHS: u32 = 3;
+/// Largest ratio of a peak to the one before. A loop that grows faster is three times beyond its stability limit, and exceeds the
+/// speed limit one swing later; a joint that begins to move after the noise of its encoder at rest has a greater ratio, too.
+const MAX_GROWTH: f64 = 3.0;
 /// Peak as a fraction of the speed limit.
 const SPEED_SHARE: f64 = 0.15;
 
@@ -82,10 +85,11 @@ impl<const N: usize> Oscillation<N> {
         self.fastest_rad_per_s[joint] = velocity;
     }
 
-    /// Whether this peak is that of a quick swing, and higher than the last one.
+    /// Whether this peak is that of a quick swing, and higher than the last one by at most [`MAX_GROWTH`].
     fn has_grown(&self, joint: usize, peak: f64) -> bool {
         let is_quick = self.now_s - self.turned_s[joint] <= MAX_SWING_S;
-        is_quick && peak > self.last_peak_rad_per_s[joint]
+        let last_peak = self.last_peak_rad_per_s[joint];
+        is_quick && peak > last_peak && peak <= MAX_GROWTH * last_peak
     }
 
     /// Judges a swing that may be the last of those that grow, before it ends.

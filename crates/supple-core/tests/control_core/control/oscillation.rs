@@ -7,6 +7,7 @@ use std::collections::VecDeque;
 use std::f64::consts::TAU;
 use supple_core::controller::{Fault, SafeAction};
 use supple_core::{Output, Vector};
+use supple_random::Random;
 
 /// The arm in gravity hold, with torques that come this much later than the configuration says, after a blow of 0.02 rad/s.
 /// Its output at the first fault within 4 s, with the kinetic energy \[J\].
@@ -85,5 +86,31 @@ fn only_quick_swings_that_grow_are_a_fault() {
     }
     for frequency_hz in [2.0, 4.0, 6.0] {
         assert!(!is_fault(frequency_hz, 0.1, 1.15), "{frequency_hz} Hz");
+    }
+}
+
+/// The noise of an encoder at rest makes small swings that may happen to grow: the joint that then begins to move does not
+/// oscillate.
+#[test]
+fn a_joint_that_starts_to_move_after_noise_at_rest_is_none() {
+    let (count_rad, rest_cycles) = (1.2e-3, 150);
+    for seed in 0..100 {
+        let mut rig = Rig::holding(four(), bent());
+        let mut random = Random::new(seed);
+        for cycle in 0..rest_cycles + 40 {
+            let count = match cycle < rest_cycles {
+                true => (1.1 * random.signed()).trunc(),
+                false => 0.0,
+            };
+            let moving_s = 1e-3 * f64::from((cycle - rest_cycles).max(0));
+            let angle_rad = 15.0 * moving_s * moving_s + count * count_rad;
+            rig.q = bent() + Vector::from([0.0, 0.0, 0.0, angle_rad]);
+            let output = rig.cycle();
+            assert!(
+                output.fault.is_none(),
+                "{seed}, {cycle}: {:?}",
+                output.fault
+            );
+        }
     }
 }

@@ -85,7 +85,20 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         self.say(&summary(&quality));
         let found = found
             .with_held_joints_of(self.start)
+            .and_then(|found| found.with_stable_damping::<N>())
             .map_err(ProcedureError::from)?;
+        let (found, shares) = found;
+        for (gains, share) in ["damping of gravity hold", "gains of held joints"]
+            .iter()
+            .zip(shares)
+        {
+            if share < 1.0 {
+                self.say(&format!(
+                    "{gains}: reduced to {:.0} %, since the identified inertias and the delay of the loop allow no more",
+                    100.0 * share
+                ));
+            }
+        }
         found
             .save(&self.options.out)
             .map_err(ProcedureError::from)?;
