@@ -339,7 +339,7 @@ pub fn identify(
     let logs = logs.iter().map(|log| Samples::read(log, of.dof()));
     let logs = logs.collect::<PyResult<Vec<_>>>()?;
     let find_stribeck = options.find_stribeck;
-    let mut procedure = options.procedure()?;
+    let mut procedure = options.procedure(&of)?;
     let whole = of.clone();
     let found = interruptible(py, move |cancelled| -> Result<_, Refused> {
         procedure.cancellation = Arc::clone(cancelled).into();

@@ -2,7 +2,10 @@
 
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use supple_ident::{Cancellation, FrictionChoice, FrictionColumns, Method, Preparation, Procedure};
+use supple_ident::{
+    Cancellation, Effects, FrictionChoice, FrictionColumns, Method, Preparation, Procedure,
+};
+use supple_model::Description;
 
 /// Options of an identification; the package checks names and fills in defaults.
 #[derive(FromPyObject)]
@@ -17,6 +20,7 @@ pub struct Options {
     accept_wrong_logs: bool,
     method: String,
     friction: Option<Shape>,
+    effects: bool,
     /// Whether to fit a Stribeck effect, its speed included.
     pub find_stribeck: bool,
     rotor: bool,
@@ -37,8 +41,8 @@ struct Shape {
 }
 
 impl Options {
-    /// Converts the options to those of the crate.
-    pub fn procedure(self) -> PyResult<Procedure> {
+    /// Converts the options to those of the crate, for this arm.
+    pub fn procedure(self, arm: &Description) -> PyResult<Procedure> {
         let method = match &self.method[..] {
             "ols" => Method::Ols,
             "wls" => Method::Wls,
@@ -60,7 +64,10 @@ impl Options {
             band_rad_per_s: shape.band_rad_per_s,
         };
         Ok(Procedure {
-            effects: supple_ident::Effects::default(),
+            effects: match self.effects {
+                true => Effects::all(arm.motors().motor_from_joint.clone()),
+                false => Effects::default(),
+            },
             moving: self.moving,
             couplings: self.couplings,
             preparation: Preparation {

@@ -13,6 +13,7 @@ use crate::mismatch::Mismatch;
 use crate::recorded_logs::CUTOFF_HZ;
 pub use crate::recorded_logs::{log_of, preparation};
 use crate::ripple::identify_ripple;
+use nalgebra::DMatrix;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::PathBuf;
@@ -349,7 +350,7 @@ pub fn identify_with<const N: usize>(
         slow_rad_per_s,
         prior_weight: Some(options.prior_weight),
         rotor_deviation: options.rotor_deviation,
-        effects: Effects::all(&motor_from_joint),
+        effects: Effects::all(DMatrix::from_fn(N, N, |m, j| motor_from_joint[(m, j)])),
         ..Procedure::default()
     };
     let fine = preparation(start.period_s, CUTOFF_HZ.1);

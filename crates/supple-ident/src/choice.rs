@@ -56,7 +56,7 @@ impl fmt::Display for Table {
 /// A cross-validated choice with its table of held-out errors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
-    /// `friction`, `load`, `band`, `prior` or `weights`.
+    /// `effects`, `friction`, `load`, `band`, `prior` or `weights`.
     pub subject: &'static str,
     /// The candidates.
     pub table: Table,

@@ -12,7 +12,6 @@
 //! nominal arm; an error of some per cent of it is one of some per cent in the small effect.
 
 use nalgebra::DMatrix;
-use supple_core::Matrix;
 
 /// Which of the effects are identified.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -29,12 +28,12 @@ pub struct Effects {
 
 impl Effects {
     /// All of them, for an arm with this `j2mp`.
-    pub fn all<const N: usize>(motor_from_joint: &Matrix<N, N>) -> Effects {
+    pub fn all(motor_from_joint: DMatrix<f64>) -> Effects {
         Effects {
             springs: true,
             tilt: true,
             compliance: true,
-            motor_from_joint: Some(DMatrix::from_fn(N, N, |m, j| motor_from_joint[(m, j)])),
+            motor_from_joint: Some(motor_from_joint),
         }
     }
 

@@ -56,7 +56,7 @@ pub struct Procedure {
     pub moving: Option<Vec<usize>>,
     /// Pairs of joints coupled by a gear: one motor turns with the sum of their angles.
     pub couplings: Vec<(usize, usize)>,
-    /// Other effects of a real arm that are identified; none by default.
+    /// Other effects of a real arm that are identified if cross-validation finds that they predict better; none by default.
     pub effects: Effects,
     /// Resampling, filter and decimation of the logs.
     pub preparation: Preparation,
@@ -144,13 +144,14 @@ pub fn identify_motions<const N: usize>(
     if motions.is_empty() {
         return Err(shape_error("logs", "at least one log", "none"));
     }
+    let (procedure, effects) = procedure.with_chosen_effects(nominal, motions, moving)?;
     let (options, choices) = procedure.options(nominal, motions, moving)?;
     let mut found = fit(nominal, motions, moving, &options)?;
     found.preparation = procedure.preparation;
     if procedure.estimate_delay {
         found.preparation.torque_delay_s = median_delay_s(motions);
     }
-    found.choices = choices;
+    found.choices = effects.into_iter().chain(choices).collect();
     found.warnings = found.result_warnings();
     Ok(found)
 }
@@ -224,23 +225,43 @@ impl Procedure {
         Ok(moving)
     }
 
-    /// Selects by cross-validation which effects of this procedure to identify: none, all without the compliance, or all.
+    /// The procedure with those of its effects that cross-validation selects, none, all without the compliance, or all, and the
+    /// choice; without effects there is none.
     ///
     /// # Errors
     /// As [`identify_motions`].
-    pub(crate) fn chosen_effects<const N: usize>(
+    pub(crate) fn with_chosen_effects<const N: usize>(
         &self,
         nominal: &Arm<N>,
         motions: &[Motion],
         moving: &[usize],
-    ) -> Result<Effects, IdentError> {
-        let (options, _) = self.options(nominal, motions, moving)?;
-        let candidates = effects_candidates(&options, &self.effects);
-        if candidates.is_empty() {
-            return Ok(Effects::default());
+    ) -> Result<(Procedure, Option<Choice>), IdentError> {
+        if self.effects == Effects::default() {
+            return Ok((self.clone(), None));
         }
+        // Friction and prior are chosen with the chosen effects; until then all fits have the same.
+        let before = Procedure {
+            friction: match self.friction {
+                FrictionChoice::Auto => {
+                    FrictionChoice::Columns(FrictionColumns::COULOMB_AND_OFFSET)
+                }
+                columns => columns,
+            },
+            prior_weight: self.prior_weight.or(Some(PRIOR)),
+            ..self.clone()
+        };
+        let (options, _) = before.options(nominal, motions, moving)?;
+        let candidates = effects_candidates(&options, &self.effects);
         let table = compare(nominal, motions, moving, &candidates, FOLDS)?;
-        Ok(table.options().effects.clone())
+        let chosen = Procedure {
+            effects: table.options().effects.clone(),
+            ..self.clone()
+        };
+        let choice = Choice {
+            subject: "effects",
+            table,
+        };
+        Ok((chosen, Some(choice)))
     }
 
     /// Complete options and the choices that led to them.

@@ -112,11 +112,8 @@ pub fn weights_candidates(base: &Options) -> Vec<Candidate> {
     .to_vec()
 }
 
-/// No other effects than friction, those of `effects` without compliance, and all of them; empty without effects.
+/// No other effects than friction, those of `effects` without compliance, and all of them.
 pub fn effects_candidates(base: &Options, effects: &Effects) -> Vec<Candidate> {
-    if *effects == Effects::default() {
-        return Vec::new();
-    }
     let rigid = Effects {
         compliance: false,
         ..effects.clone()

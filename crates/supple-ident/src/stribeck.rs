@@ -25,10 +25,7 @@ pub fn fit_with_stribeck<const N: usize>(
     moving: &[usize],
     procedure: &Procedure,
 ) -> Result<Fit<N>, IdentError> {
-    let procedure = &Procedure {
-        effects: procedure.chosen_effects(nominal, motions, moving)?,
-        ..procedure.clone()
-    };
+    let (procedure, effects) = procedure.with_chosen_effects(nominal, motions, moving)?;
     let mut best: Option<(Fit<N>, f64)> = None;
     for speed in SPEEDS_RAD_PER_S {
         let columns = match procedure.friction {
@@ -54,6 +51,7 @@ pub fn fit_with_stribeck<const N: usize>(
     let mut found =
         best.ok_or_else(|| crate::error::shape_error("motions", "at least one", "none"))?;
     found.presliding_rad = presliding_rad(&found, motions)?;
+    found.choices.extend(effects);
     Ok(found)
 }
 

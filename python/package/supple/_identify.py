@@ -76,6 +76,7 @@ def identify(
     slow_rad_per_s: float | None = None,
     prior_weight: float | None = None,
     joint_noise_nm: ArrayLike | None = None,
+    effects: Literal["auto", "none"] = "none",
     accept_wrong_logs: bool = False,
 ) -> Fit:
     """Identify an arm from one or several logs.
@@ -132,6 +133,10 @@ def identify(
         Weight of the nominal model, in equivalent observations. Default: by cross-validation.
     joint_noise_nm : array_like, (M,), optional
         Noise of each moving joint's torque (N m), instead of weights from residuals.
+    effects : {"none", "auto"}
+        ``"auto"`` identifies springs over the joints (hoses), tilt of the base, compliance, and friction of
+        motors that drive several joints, if cross-validation finds that they predict better. They become
+        part of ``Fit.arm()``.
     accept_wrong_logs : bool
         Whether to fit a log although its checks against ``arm`` found an error (units, signs, order, zeros,
         clock); what they found is then a warning.
@@ -176,6 +181,8 @@ def identify(
     if isinstance(friction, str) and friction not in ("auto", *_FRICTION):
         known = ", ".join(("auto", *_FRICTION))
         raise ValueError(f"friction: expected one of {known} or FrictionColumns, got {friction!r}")
+    if effects not in ("auto", "none"):
+        raise ValueError(f"effects: expected auto or none, got {effects!r}")
     columns = _FRICTION.get(friction) if isinstance(friction, str) else friction
     find_stribeck = friction == "stribeck"
     if slow_rad_per_s is None:
@@ -195,6 +202,7 @@ def identify(
             "find_stribeck": find_stribeck,
             "method": method,
             "friction": columns,
+            "effects": effects == "auto",
             "rotor": rotor,
             "slow_rad_per_s": slow_rad_per_s,
             "prior_weight": prior_weight,

@@ -104,6 +104,15 @@ pub enum FrictionArg {
     Load,
 }
 
+/// Effects beside links and friction of the joints.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum EffectsArg {
+    /// By cross-validation: none, all but the compliance, or all.
+    Auto,
+    /// None.
+    None,
+}
+
 impl From<FrictionArg> for FrictionChoice {
     fn from(argument: FrictionArg) -> FrictionChoice {
         let columns = match argument {
@@ -190,6 +199,10 @@ pub struct IdentifyArgs {
     /// Friction columns of every moving joint. Default: chosen by cross-validation.
     #[arg(long, value_enum, default_value = "auto")]
     pub friction: FrictionArg,
+    /// Springs over the joints (hoses, wires), tilt of the base, compliance, and friction of motors that drive several joints:
+    /// all of them if cross-validation finds that they predict better. Default: auto for MCAP, none for CSV.
+    #[arg(long, value_enum)]
+    pub effects: Option<EffectsArg>,
     /// Weight of the given arm, in equivalent observations. Default: chosen by cross-validation.
     #[arg(long, value_name = "N", value_parser = between(1e-6, 1e9))]
     pub prior_weight: Option<f64>,

@@ -12,8 +12,8 @@ pub use demo::DemoArgs;
 pub use effects::EffectsArgs;
 pub use identification::{
     BreakawayArgs, CalibrateArgs, CalibratePaperArgs, CalibrationPlant, Criterion, DesignArgs,
-    ExciteCommand, FrictionArg, IdentificationCommand, IdentifyArgs, LearnArgs, RunArgs, Solver,
-    TorqueDelay,
+    EffectsArg, ExciteCommand, FrictionArg, IdentificationCommand, IdentifyArgs, LearnArgs,
+    RunArgs, Solver, TorqueDelay,
 };
 pub use log::{LogCommand, LogDataCommand, PlotArgs};
 pub use new::NewArgs;

@@ -75,6 +75,12 @@ impl<const N: usize> Encoders<N> {
         self.to_joint.column(encoder).dot(joints_nm)
     }
 
+    /// Inertia that a motor turns with its encoder, for the mass matrix of the joints \[kg m^2\].
+    pub(super) fn inertia_at(&self, encoder: usize, mass_matrix: &Matrix<N, N>) -> f64 {
+        let joints = self.to_joint.column(encoder);
+        joints.dot(&(mass_matrix * joints))
+    }
+
     /// External torque on the motor of each encoder, as of [`Encoders::torque_at`], above which dry friction does not hold it
     /// \[N m\]. It includes an error of the model.
     pub(super) fn stiction_limit_nm(

@@ -151,6 +151,16 @@ impl<const N: usize> Controller<N> {
         }
     }
 
+    /// Change of the observed torque over that of a joint's angle, for an inertia of 1 kg m^2, when an encoder steps: the
+    /// estimated velocity of a step of 1 rad has its peak, `omega / e`, at `1 / omega` \[N m/(rad kg m^2)\].
+    pub(super) fn observed_per_step(&self) -> f64 {
+        let (estimator, observer) = (
+            self.config.estimator_rad_per_s,
+            self.config.latch.observer_rad_per_s,
+        );
+        estimator / core::f64::consts::E * observer
+    }
+
     /// Damping of each joint in the null space of the position task \[N m s/rad\]: that of the law, or as much
     /// as the delay allows where the joint is light, as the last ones of a wrist are.
     pub fn nullspace_damping_nm_s_per_rad(&self) -> &Vector<N> {

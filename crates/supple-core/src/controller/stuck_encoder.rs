@@ -140,6 +140,16 @@ impl<const N: usize> StuckEncoders<N> {
         })
     }
 
+    /// Smallest change of an encoder, its resolution; zero if all have been greater than [`MAX_RESOLUTION_RAD`] \[rad\].
+    fn step_rad(&self, encoder: usize) -> f64 {
+        let change_rad = self.min_change_rad[encoder];
+        if change_rad <= MAX_RESOLUTION_RAD {
+            change_rad
+        } else {
+            0.0
+        }
+    }
+
     /// Whether an encoder is unchanged since the last cycle.
     pub fn any_unchanged(&self) -> bool {
         self.unchanged.contains(&true)
@@ -268,7 +278,8 @@ impl<const N: usize> StuckEncoders<N> {
 
     /// Reports a stuck encoder if it is unchanged although the external torque on its motor has grown beyond
     /// `stiction_limit_nm`, what dry friction holds, for some time. A torque that was that large when the encoder stopped may be
-    /// that of an obstacle. After [`StuckEncoders::check_sudden_stop`] of the same cycle.
+    /// that of an obstacle. `step_nm_per_rad` is what a step of an encoder adds to the observed torque \[N m/rad\]: that after its
+    /// last step differs by so much from the true one. After [`StuckEncoders::check_sudden_stop`] of the same cycle.
     #[inline(never)]
     pub fn check_torque(
         &mut self,
@@ -276,6 +287,7 @@ impl<const N: usize> StuckEncoders<N> {
         plausible: &PlausibilityLimits,
         external_nm: &Vector<N>,
         stiction_limit_nm: &Vector<N>,
+        step_nm_per_rad: impl Fn(usize) -> f64,
         elapsed_s: f64,
     ) -> Result<(), Fault> {
         for encoder in (0..N).filter(|encoder| self.unchanged[*encoder]) {
@@ -285,8 +297,10 @@ impl<const N: usize> StuckEncoders<N> {
             }
             let stopped_at_nm = self.external_nm[encoder];
             let (value_nm, limit_nm) = (abs(torque_nm), stiction_limit_nm[encoder]);
+            let growth_nm = abs(torque_nm - stopped_at_nm);
             let grows = value_nm > limit_nm.max(abs(stopped_at_nm))
-                && abs(torque_nm - stopped_at_nm) > limit_nm;
+                && growth_nm > limit_nm
+                && growth_nm > limit_nm + self.step_rad(encoder) * step_nm_per_rad(encoder);
             self.loaded_s[encoder] = match grows {
                 true => self.loaded_s[encoder] + elapsed_s,
                 false => 0.0,

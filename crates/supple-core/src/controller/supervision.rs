@@ -333,6 +333,10 @@ impl<const N: usize> State<N> {
                     &config.plausible,
                     &external_nm,
                     controller.stiction_limit_nm(),
+                    |encoder| {
+                        let inertia_kg_m2 = encoders.inertia_at(encoder, &self.terms.mass_matrix);
+                        inertia_kg_m2 * controller.observed_per_step()
+                    },
                     evidence.elapsed_s,
                 )?;
             }

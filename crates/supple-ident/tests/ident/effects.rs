@@ -19,7 +19,7 @@ fn wam4() -> Config<4> {
 
 fn all_effects(config: &Config<4>) -> Effects {
     let motor_from_joint = config.joint_from_motor.try_inverse().unwrap();
-    Effects::all(&motor_from_joint)
+    Effects::all(DMatrix::from_fn(4, 4, |m, j| motor_from_joint[(m, j)]))
 }
 
 fn columns(config: &Config<4>) -> Columns {

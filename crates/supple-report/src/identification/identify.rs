@@ -3,7 +3,7 @@
 use super::report::{ReportInput, Summary, html, summary};
 use crate::progress::Steps;
 use std::path::Path;
-use supple_cli::arguments::{IdentifyArgs, TorqueDelay};
+use supple_cli::arguments::{EffectsArg, IdentifyArgs, TorqueDelay};
 use supple_cli::arms;
 use supple_cli::console::{json, print_line};
 use supple_cli::exit::Failure;
@@ -11,8 +11,8 @@ use supple_cli::out::Staging;
 use supple_core::Arm;
 use supple_experiment::predict_tracking_error;
 use supple_ident::{
-    Fit, Log, Motion, Preparation, Procedure, Validation, fit_with_stribeck, identify_motions,
-    read_logs,
+    Effects, Fit, Log, Motion, Preparation, Procedure, Validation, fit_with_stribeck,
+    identify_motions, read_logs,
 };
 use supple_model::{Description, with_dof};
 
@@ -39,9 +39,17 @@ pub fn run(args: &IdentifyArgs) -> Result<(), Failure> {
     with_dof!(arm.dof(), N => run_with_dof::<N>(&arm, args))?
 }
 
-fn procedure(args: &IdentifyArgs, period_s: f64) -> Procedure {
+fn procedure(args: &IdentifyArgs, period_s: f64, effects: Effects) -> Procedure {
     let all_mcap = all_mcap(args);
+    let by_default = match all_mcap {
+        true => EffectsArg::Auto,
+        false => EffectsArg::None,
+    };
     Procedure {
+        effects: match args.effects.unwrap_or(by_default) {
+            EffectsArg::Auto => effects,
+            EffectsArg::None => Effects::default(),
+        },
         moving: (!args.moving.is_empty()).then(|| args.moving.clone()),
         couplings: args.coupling.clone(),
         preparation: Preparation {
@@ -113,7 +121,8 @@ fn motions<const N: usize>(
 fn run_with_dof<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Result<(), Failure> {
     let staging = Staging::new(&args.out, &FILES)?;
     let nominal = arm.arm::<N>()?;
-    let procedure = procedure(args, arm.settings().period_s);
+    let effects = Effects::all(arm.motors().motor_from_joint.clone());
+    let procedure = procedure(args, arm.settings().period_s, effects);
     let moving = procedure.moving_joints(N)?;
     let mut warnings = Vec::new();
     let mut steps = Steps::new(STEPS, args.quiet);

@@ -188,9 +188,14 @@ fn an_arm_stopped_by_braking_can_be_reenabled() {
 }
 
 /// Lets the reference of a law move away from a blocked arm in two seconds, whose joints yield by `yielding_rad` in each tenth of
-/// these cycles, and then not at all for a second. The fault, and the force of the law before \[N\].
-fn held_under_a_stiff_law(stiffness_n_per_m: f64, yielding_rad: f64) -> (Option<Fault>, f64) {
-    let mut config = guarded();
+/// these cycles, and then not at all for a second; one motor of the differential also moves to and fro by `flicker_rad`, at first every 10 cycles, then
+/// every 50. The fault, and the force of the law before \[N\].
+fn held_under_a_stiff_law(
+    mut config: Config<4>,
+    stiffness_n_per_m: f64,
+    yielding_rad: f64,
+    flicker_rad: f64,
+) -> (Option<Fault>, f64) {
     config.plausible.stuck_rad = 1.0;
     config.collision = Collision::disabled();
     config.limits.tracking_error_m = 1.0;
@@ -217,6 +222,12 @@ fn held_under_a_stiff_law(stiffness_n_per_m: f64, yielding_rad: f64) -> (Option<
         if k < 2000 && k % 10 == 0 {
             rig.q -= Vector::repeat(yielding_rad);
         }
+        let half_cycles = if k < 2000 { 10 } else { 50 };
+        if k % half_cycles == 0 {
+            let up = k % (2 * half_cycles) == 0;
+            let step_rad = 0.5 * if up { flicker_rad } else { -flicker_rad };
+            rig.q += Vector::from([0.0, step_rad, step_rad, 0.0]);
+        }
     }
     (None, stiffness_n_per_m * error_m)
 }
@@ -227,7 +238,7 @@ fn held_under_a_stiff_law(stiffness_n_per_m: f64, yielding_rad: f64) -> (Option<
 #[test]
 fn a_stiff_law_does_not_push_a_stuck_encoder() {
     for stiffness_n_per_m in [200.0, 1000.0] {
-        let (fault, force_n) = held_under_a_stiff_law(stiffness_n_per_m, 0.0);
+        let (fault, force_n) = held_under_a_stiff_law(guarded(), stiffness_n_per_m, 0.0, 0.0);
         let Some(Fault::EncoderUnmoved {
             value_nm, limit_nm, ..
         }) = fault
@@ -236,8 +247,20 @@ fn a_stiff_law_does_not_push_a_stuck_encoder() {
         };
         assert!(value_nm < 1.5 * limit_nm, "{value_nm} N m, {limit_nm} N m");
         assert!(force_n < 15.0, "{force_n} N");
-        let (fault, _) = held_under_a_stiff_law(stiffness_n_per_m, 1e-5);
+        let (fault, _) = held_under_a_stiff_law(guarded(), stiffness_n_per_m, 1e-5, 0.0);
         assert_eq!(fault, None, "at {stiffness_n_per_m} N/m, yielding");
     }
-    assert_eq!(held_under_a_stiff_law(5.0, 0.0).0, None);
+    assert_eq!(held_under_a_stiff_law(guarded(), 5.0, 0.0, 0.0).0, None);
+}
+
+/// The step of a coarse encoder makes the observed torque of a loaded joint dip: its return is no torque that grows.
+#[test]
+fn steps_of_a_coarse_encoder_under_load_are_no_growing_torque() {
+    let mut config = guarded();
+    config.estimator_rad_per_s = 500.0;
+    for flicker_rad in [4e-4, 8e-4] {
+        let (fault, force_n) = held_under_a_stiff_law(config, 200.0, 1e-5, flicker_rad);
+        assert_eq!(fault, None, "{flicker_rad} rad");
+        assert!(force_n > 10.0, "{force_n} N");
+    }
 }
