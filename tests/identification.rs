@@ -422,4 +422,18 @@ fn a_realistic_arm_is_calibrated_step_by_step() {
     assert!(alone_m.is_some_and(|m| m < 0.025), "{sinusoid:?}");
     assert!(learning_m.is_some_and(|m| m < 0.005), "{sinusoid:?}");
     assert_eq!(sinusoid.false_contacts, 0);
+    // What was learned is kept: with it the arm, as warm as it is now, needs no more learning.
+    let kept = sinusoid.learned_model.expect("learned");
+    let kept = Description::load(folder.path().join(kept).join("arm.toml")).expect("saved");
+    let warm = Calibration {
+        plant: PlantOptions {
+            warmed_s: Some(progress.moved_s),
+            ..calibration.plant
+        },
+        ..calibration
+    };
+    let plant = plant_of::<4>(&arm, &warm).expect("four joints");
+    let errors = track_with_identified_model(&kept, &plant).expect("the sinusoid runs");
+    let errors = errors.expect("in reach");
+    assert!(errors.stribeck_m < 0.008, "{errors:?}");
 }

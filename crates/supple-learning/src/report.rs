@@ -1,6 +1,7 @@
 //! What a learner has estimated.
 
 use crate::freeze::Frozen;
+use supple_core::Vector;
 use supple_core::learned::LearnedTerms;
 
 /// State of a learner.
@@ -18,4 +19,25 @@ pub struct Report<const N: usize> {
     pub disturbances: u64,
     /// Why nothing is learned at the moment.
     pub frozen: Option<Frozen>,
+}
+
+impl<const N: usize> Report<N> {
+    /// Where the terms come from, with their uncertainty, for the TOML of an arm.
+    pub fn source(&self) -> String {
+        let with_deviation = |value: Vector<N>, deviation: Vector<N>| {
+            let each = value.iter().zip(&deviation);
+            let each: Vec<String> = each.map(|(v, d)| format!("{v:.4} +- {d:.4}")).collect();
+            each.join(", ")
+        };
+        let (terms, deviations) = (&self.terms.parameters, &self.deviations.parameters);
+        let times: Vec<String> = self.learned_s.iter().map(|s| format!("{s:.1}")).collect();
+        format!(
+            "learned while moving, from {} s of motion by joint; standard deviations: Coulomb friction {} N m; payload \
+             {:.4} +- {:.4} kg",
+            times.join(", "),
+            with_deviation(terms.coulomb_nm, deviations.coulomb_nm),
+            terms.payload_kg,
+            deviations.payload_kg
+        )
+    }
 }

@@ -6,11 +6,11 @@
 
 use std::io::ErrorKind;
 use std::sync::Arc;
+use supple_core::Config;
 use supple_core::learned::LearnedTerms;
-use supple_core::{Config, Vector};
 use supple_ipc::Domain;
 use supple_ipc::message::{OperatorRequest, Telemetry};
-use supple_learning::{Learner, Report};
+use supple_learning::Learner;
 use supple_model::{Description, ModelError};
 use supple_realtime::{BackgroundWriter, diagnostics};
 
@@ -42,7 +42,7 @@ pub fn learning<const N: usize>(
         let scheduled = learner.observe(&telemetry.record_of::<N>());
         if !scheduled.is_empty() {
             let report = learner.report();
-            file.write(report.terms, source(&report));
+            file.write(report.terms, report.source());
         }
         scheduled
             .iter()
@@ -51,25 +51,6 @@ pub fn learning<const N: usize>(
             })
             .collect()
     }))
-}
-
-/// Where the terms come from, with their uncertainty, for the TOML.
-fn source<const N: usize>(report: &Report<N>) -> String {
-    let with_deviation = |value: Vector<N>, deviation: Vector<N>| {
-        let each = value.iter().zip(&deviation);
-        let each: Vec<String> = each.map(|(v, d)| format!("{v:.4} +- {d:.4}")).collect();
-        each.join(", ")
-    };
-    let (terms, deviations) = (&report.terms.parameters, &report.deviations.parameters);
-    let times: Vec<String> = report.learned_s.iter().map(|s| format!("{s:.1}")).collect();
-    format!(
-        "learned while moving, from {} s of motion by joint; standard deviations: Coulomb friction {} N m; payload \
-         {:.4} +- {:.4} kg",
-        times.join(", "),
-        with_deviation(terms.coulomb_nm, deviations.coulomb_nm),
-        terms.payload_kg,
-        deviations.payload_kg
-    )
 }
 
 /// The arm with what is learned, on the disk.

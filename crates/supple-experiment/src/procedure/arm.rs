@@ -39,6 +39,12 @@ pub trait MotionArm<const N: usize> {
     /// If the fault persists.
     fn recover(&mut self) -> Result<(), Self::Error>;
 
+    /// The arm with what its controller has learned since it was loaded; `None` if that is nothing.
+    ///
+    /// # Errors
+    /// If what was learned cannot be read.
+    fn learned(&mut self) -> Result<Option<Description>, Self::Error>;
+
     /// Does `work` while the arm keeps its mode.
     ///
     /// # Errors

@@ -239,6 +239,17 @@ impl<const N: usize> MotionArm<N> for InProcessArm<N> {
         )
     }
 
+    fn learned(&mut self) -> Result<Option<Description>, ProcedureError> {
+        let report = self.rig()?.report();
+        let (Some(report), Some(model)) = (report, &self.model) else {
+            return Ok(None);
+        };
+        if report.learned_s.iter().all(|s| *s == 0.0) {
+            return Ok(None);
+        }
+        Ok(Some(model.with_learned(&report.terms, &report.source())?))
+    }
+
     fn meanwhile<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> Result<T, ProcedureError> {
         Ok(work())
     }

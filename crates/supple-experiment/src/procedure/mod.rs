@@ -22,7 +22,9 @@ mod thresholds;
 mod wiring;
 
 pub(crate) use options::HOLD_REMEDY;
-pub use options::{DRAWING, FIRST_MODEL, LEARNING_S, LOGS, Operator, ProcedureOptions};
+pub use options::{
+    DRAWING, FIRST_MODEL, LEARNED_MODEL, LEARNING_S, LOGS, Operator, ProcedureOptions,
+};
 
 pub use arm::{Collector, Motion, MotionArm, Performed, StopCause, Stopped};
 pub use error::ProcedureError;

@@ -21,6 +21,9 @@ pub const LOGS: &str = "logs";
 /// Folder of the model of the first pass, within that of the results.
 pub const FIRST_MODEL: &str = "first";
 
+/// Folder of the identified model with what was learned in the sinusoid, within that of the results.
+pub const LEARNED_MODEL: &str = "learned";
+
 /// Drawing of the swept space.
 pub const DRAWING: &str = "sweep.svg";
 

@@ -115,6 +115,9 @@ pub struct SinusoidResult {
     pub calibrated_rms_m: Option<f64>,
     /// RMS error after [`super::LEARNING_S`] of learning \[m\]; `None` if a fault ended it.
     pub learning_rms_m: Option<f64>,
+    /// Folder of the model with what was learned, within that of the results; `None` if nothing was learned.
+    #[serde(default)]
+    pub learned_model: Option<String>,
     /// Contacts reported in free motion.
     pub false_contacts: usize,
     /// The fault that ended it.

@@ -65,5 +65,16 @@ pub fn print(found: &CalibratedArm, out: &Path, json: bool) -> Result<(), Failur
             print_line(&format!("a fault ended the sinusoid: {fault}"))?;
         }
     }
-    print_line(&format!("model: {}", out.display()))
+    print_line(&format!("model: {}", out.display()))?;
+    let learned = progress
+        .sinusoid
+        .as_ref()
+        .and_then(|of| of.learned_model.as_ref());
+    match learned {
+        Some(folder) => print_line(&format!(
+            "model with what was learned in the sinusoid: {}",
+            out.join(folder).display()
+        )),
+        None => Ok(()),
+    }
 }

@@ -57,6 +57,8 @@ pub struct RunningArm<const N: usize> {
     options: PlantOptions,
     folder: PathBuf,
     logs: PathBuf,
+    /// Folder in which the controller keeps the arm with what it has learned.
+    learned: PathBuf,
     model: Description,
     stop: Stop,
     recorder: Option<Recorder<N>>,
@@ -91,6 +93,7 @@ impl<const N: usize> RunningArm<N> {
             virtual_time: args.virtual_time,
             options: args.plant_options.options()?,
             folder: out.join(MODEL),
+            learned: domain.learned_folder(),
             logs: out.join(supple_experiment::procedure::LOGS),
             model: description.clone(),
             stop,
@@ -539,6 +542,14 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
             Err(failure) => return Err(failure),
         }
         self.activate(Some(from))
+    }
+
+    fn learned(&mut self) -> Result<Option<Description>, Failure> {
+        let file = self.learned.join("arm.toml");
+        match file.exists() {
+            true => Ok(Some(Description::load(file)?)),
+            false => Ok(None),
+        }
     }
 
     fn meanwhile<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> Result<T, Failure> {

@@ -4,10 +4,10 @@ use super::{FLOAT_S, GAINS_S, RETURN_S, Run, Stage, config};
 use crate::error::ExperimentError;
 use crate::excite::move_to;
 use crate::metrics::Rms;
-use crate::procedure::LEARNING_S;
 use crate::procedure::arm::MotionArm;
 use crate::procedure::error::ProcedureError;
 use crate::procedure::progress::{SinusoidResult, StepName};
+use crate::procedure::{LEARNED_MODEL, LEARNING_S};
 use crate::request_sequence::Step;
 use crate::scenario;
 use crate::start::start_pose;
@@ -118,6 +118,13 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
                 false => result.calibrated_rms_m = Some(rms.rms()),
                 true => result.learning_rms_m = Some(rms.rms()),
             }
+        }
+        if result.learning_rms_m.is_some()
+            && let Some(learned) = self.arm.learned()?
+        {
+            let folder = self.options.out.join(LEARNED_MODEL);
+            learned.save(&folder).map_err(ProcedureError::from)?;
+            result.learned_model = Some(LEARNED_MODEL.to_owned());
         }
         self.progress.sinusoid = Some(result);
         let home_rad = self.home_rad;
