@@ -321,7 +321,7 @@ fn a_friction_error_of_10_percent_is_learnt_within_four_periods() {
         let prepare = preparation(config.period_s, 8.0);
         let (motion, _) = Motion::prepare(&log, 4, &moving, &prepare).expect("a log");
         let learning = Learning::default();
-        config.friction = learn(&config.arm, &config.friction, &[motion], &moving, &learning)
+        config.friction = learn(&config, &[motion], &moving, &learning)
             .expect("it learns")
             .friction;
     }

@@ -6,9 +6,8 @@ use crate::errors;
 use crate::samples::{LogInput, Samples};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use supple_ident::learn::with_payload;
 use supple_ident::{Learned, Learning, Preparation, SaveError, learn as learned};
-use supple_model::{Description, IdentifiedModel, with_dof};
+use supple_model::{Description, with_dof};
 
 /// Options of the learning; the package fills in defaults.
 #[derive(FromPyObject)]
@@ -80,25 +79,14 @@ fn sized<const N: usize>(
         payload_kg: options.payload_kg,
         noise_nm: options.noise_nm,
     };
+    let learnt = learned(&config, &motions, &options.moving, &learning)?;
+    let description = learnt.description(of)?;
     let Learned {
-        friction,
         payload,
         before_nm,
         after_nm,
-    } = learned(
-        &config.arm,
-        &config.friction,
-        &motions,
-        &options.moving,
-        &learning,
-    )?;
-    let arm = with_payload(&config.arm, payload.as_ref())?;
-    let description = of.with_model(&IdentifiedModel {
-        arm: &arm,
-        friction: &friction,
-        ripple: None,
-        source: "friction learnt from repeated motion",
-    })?;
+        ..
+    } = learnt;
     Ok(Found {
         description,
         before_nm: before_nm.to_vec(),

@@ -332,3 +332,16 @@ def test_doubtful_data_give_warnings(arm):
             arm, t, q, torques(arm, q, qd, qdd), qd, qdd, method="ols", friction="coulomb"
         )
     assert any("lasts" in warning for warning in fit.warnings)
+
+
+def test_springs_are_found_with_effects():
+    arm = supple.Arm.load("wam4")
+    t, q, qd, qdd = motion(4, 3)
+    log = (t, q, arm.rnea(q, qd, qdd) + 0.1 * q, qd, qdd)
+    options = {"friction": "none", "torque_delay_s": 0.0, "prior_weight": 1e-2}
+    plain = supple.identify(arm, *log, **options)
+    found = supple.identify(arm, *log, effects="auto", **options)
+    assert found.choices[0][0] == "effects"
+    assert found.training_relative < 0.5 * plain.training_relative
+    with pytest.raises(ValueError, match="effects: expected auto or none, got 'all'"):
+        supple.identify(arm, *log, effects="all", **options)

@@ -13,13 +13,10 @@
 use crate::tracking_prediction::GOOD_M;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
-use supple_core::dynamics::{Terms, jacobian, terms};
-use supple_core::learned::LearnedBounds;
-use supple_core::learned_torque::{LearnedAtPose, learned_torque_nm};
-use supple_core::math::Vector3;
+use supple_core::dynamics::jacobian;
 use supple_core::{Config, Vector};
-use supple_ident::Motion;
 use supple_ident::estimate::pseudo_inverse;
+use supple_ident::{Motion, feedforward_nm};
 use supple_model::reach::{REACH_CHECK_STEP_S, active_joints, follow, start_pose};
 use supple_model::{Description, ModelError};
 
@@ -266,39 +263,13 @@ pub fn error_interval_of<const N: usize>(
 
 /// Torques of the joints `moving` in a motion beyond the feed-forward of a controller with the configuration `config`, (samples,
 /// moving joints) \[N m\].
-///
-/// The feed-forward is that of the controller, not that of a fit: a fit has terms that a controller takes at their mean, such as
-/// friction that grows with the load.
 pub fn feedforward_residual_nm<const N: usize>(
     config: &Config<N>,
     moving: &[usize],
     motion: &Motion,
 ) -> DMatrix<f64> {
-    let bounds = LearnedBounds::new(&config.friction, &config.limits.joint_torque_nm);
-    let mut residual = DMatrix::zeros(motion.samples(), moving.len());
-    let mut at_pose = Terms::default();
-    for sample in 0..motion.samples() {
-        let at = |m: &DMatrix<f64>| Vector::<N>::from_fn(|j, _| m[(sample, j)]);
-        let (encoder, qd, qdd) = (at(&motion.q), at(&motion.qd), at(&motion.qdd));
-        terms(&config.arm, &encoder, &qd, &mut at_pose);
-        let q = encoder - config.compliance_rad_per_nm.component_mul(&at_pose.gravity);
-        terms(&config.arm, &q, &qd, &mut at_pose);
-        let friction = Vector::from_fn(|j, _| config.friction[j].torque_nm(qd[j]));
-        let model = at_pose.mass_matrix * qdd + at_pose.coriolis_gravity + friction;
-        let learned = LearnedAtPose::new(
-            &config.learned,
-            &config.friction,
-            &config.limits,
-            &config.arm.gravity(),
-            &q,
-            &at_pose,
-            &Vector3::zeros(),
-        );
-        let change = learned.torque_nm(&config.learned, &config.friction, &qd, None, 1.0);
-        let feedforward = model + learned_torque_nm(&config.learned, &bounds, &model, &change);
-        for (row, &joint) in moving.iter().enumerate() {
-            residual[(sample, row)] = motion.tau[(sample, joint)] - feedforward[joint];
-        }
-    }
-    residual
+    let feedforward = feedforward_nm(config, motion);
+    DMatrix::from_fn(motion.samples(), moving.len(), |sample, row| {
+        motion.tau[(sample, moving[row])] - feedforward[(sample, moving[row])]
+    })
 }

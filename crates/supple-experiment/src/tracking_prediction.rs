@@ -2,13 +2,15 @@
 //! whose models are drawn from the uncertainty of the fit.
 //!
 //! The prediction includes log noise and friction that depends on load and direction as in every simulated arm, but no
-//! other unmodelled effects: expect larger errors on a real arm, as `docs/effects.md` shows effect by effect.
+//! other effects: what a model has learned and its compliance are left out on both sides. Expect larger errors on a real arm, as `docs/effects.md` shows effect by effect.
 
 use crate::error::ExperimentError;
 use crate::metrics::median;
 use crate::run::{Plan, run};
 use crate::scenario;
 use serde::Serialize;
+use supple_core::Vector;
+use supple_core::learned::LearnedTerms;
 use supple_ident::Fit;
 use supple_model::Description;
 use supple_plant::PlantConfig;
@@ -58,6 +60,9 @@ pub fn predict_tracking_error<const N: usize>(
         };
         let mut config = identified.config::<N>()?;
         config.arm = arm;
+        // The simulated plant of a description has neither what they compensate.
+        config.learned = LearnedTerms::zero();
+        config.compliance_rad_per_nm = Vector::zeros();
         for joint in fit.columns.moving() {
             config.friction[*joint] = friction[*joint];
         }

@@ -6,12 +6,15 @@
 //! is not used: at low gain, adapting to it makes tracking worse.
 
 use crate::error::{IdentError, positive};
+use crate::feedforward::effects_nm;
 use crate::filter::LowPass;
 use crate::motion::Motion;
+use crate::save::SaveError;
 use nalgebra::{DMatrix, DVector, Vector4};
 use supple_core::dynamics::{regressor, rnea};
 use supple_core::math::{Matrix3, Vector3};
-use supple_core::{Arm, Friction, Vector};
+use supple_core::{Arm, Config, Friction, Vector};
+use supple_model::{Description, IdentifiedModel};
 
 /// Options: parameters that may change, and their expected changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,17 +54,42 @@ pub struct Learned<const N: usize> {
     pub after_nm: [f64; N],
 }
 
+impl<const N: usize> Learned<N> {
+    /// `of`, whose configuration was given to [`learn`], with the learned friction and payload. Its compliance, springs and other
+    /// `[learned]` terms stay, since they were taken into account.
+    ///
+    /// # Errors
+    /// [`SaveError`].
+    pub fn description(&self, of: &Description) -> Result<Description, SaveError> {
+        let config = of.config::<N>()?;
+        let source = "friction learnt from repeated motion";
+        let described = of.with_model(&IdentifiedModel {
+            arm: &with_payload(&config.arm, self.payload.as_ref())?,
+            friction: &self.friction,
+            ripple: None,
+            source,
+        })?;
+        match &of.settings().learned {
+            None => Ok(described),
+            Some(learned) => {
+                let source = learned.source.as_deref().unwrap_or(source);
+                Ok(described.with_learned(&config.learned, source)?)
+            }
+        }
+    }
+}
+
 /// Learns from `motions` of the joints `moving`; the others are at rest.
 ///
 /// # Errors
 /// Options out of range; no sample fast enough.
 pub fn learn<const N: usize>(
-    arm: &Arm<N>,
-    friction: &[Friction; N],
+    config: &Config<N>,
     motions: &[Motion],
     moving: &[usize],
     learning: &Learning,
 ) -> Result<Learned<N>, IdentError> {
+    let friction = &config.friction;
     positive("slow_rad_per_s", learning.slow_rad_per_s)?;
     positive("friction_change", learning.friction_change)?;
     positive("noise_nm", learning.noise_nm)?;
@@ -72,7 +100,7 @@ pub fn learn<const N: usize>(
     let mut right_hand_side = DVector::zeros(unknowns);
     let mut all_rows: Vec<Row> = Vec::new();
     for motion in motions {
-        for (joint, a, residual_nm) in rows(arm, friction, motion, moving, learning, unknowns)? {
+        for (joint, a, residual_nm) in rows(config, motion, moving, learning, unknowns)? {
             // Filtered samples are correlated.
             let weight = motion.independent_fraction / learning.noise_nm.powi(2);
             gram.ger(weight, &a, &a, 1.0);
@@ -145,13 +173,14 @@ type Row = (usize, DVector<f64>, f64);
 
 /// Joint, columns and torque residual of every sample that is used.
 fn rows<const N: usize>(
-    arm: &Arm<N>,
-    friction: &[Friction; N],
+    config: &Config<N>,
     motion: &Motion,
     moving: &[usize],
     learning: &Learning,
     unknowns: usize,
 ) -> Result<Vec<Row>, IdentError> {
+    let (arm, friction) = (&config.arm, &config.friction);
+    let effects_nm = effects_nm(config, motion);
     let samples = motion.samples();
     let low_pass = motion
         .cutoff_hz
@@ -186,7 +215,11 @@ fn rows<const N: usize>(
                 continue;
             }
             let viscous = friction[joint].viscous_nm_s_per_rad * qd[joint];
-            let known = model[joint] + viscous + friction[joint].offset_nm + dry[index][i];
+            let known = model[joint]
+                + viscous
+                + friction[joint].offset_nm
+                + dry[index][i]
+                + effects_nm[(i, joint)];
             let mut a = DVector::zeros(unknowns);
             a[2 * index] = viscous;
             a[2 * index + 1] = dry[index][i];

@@ -236,8 +236,17 @@ impl Procedure {
         motions: &[Motion],
         moving: &[usize],
     ) -> Result<(Procedure, Option<Choice>), IdentError> {
-        if self.effects == Effects::default() {
-            return Ok((self.clone(), None));
+        // A tilt that a part of the joints shows would be that of all.
+        let effects = Effects {
+            tilt: self.effects.tilt && moving.len() == N,
+            ..self.effects.clone()
+        };
+        if effects == Effects::default() {
+            let none = Procedure {
+                effects,
+                ..self.clone()
+            };
+            return Ok((none, None));
         }
         // Friction and prior are chosen with the chosen effects; until then all fits have the same.
         let before = Procedure {
@@ -251,7 +260,7 @@ impl Procedure {
             ..self.clone()
         };
         let (options, _) = before.options(nominal, motions, moving)?;
-        let candidates = effects_candidates(&options, &self.effects);
+        let candidates = effects_candidates(&options, &effects);
         let table = compare(nominal, motions, moving, &candidates, FOLDS)?;
         let chosen = Procedure {
             effects: table.options().effects.clone(),

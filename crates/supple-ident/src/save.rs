@@ -4,6 +4,7 @@ use crate::error::IdentError;
 use crate::fit::Fit;
 use crate::validate::Validation;
 use std::path::Path;
+use supple_core::learned::LearnedTerms;
 use supple_core::{Config, RippleTable};
 use supple_model::{Description, IdentifiedModel, ModelError};
 
@@ -27,8 +28,10 @@ pub enum SaveError {
 
 impl<const N: usize> Fit<N> {
     /// `of` with the identified model: inertias of all links, rotors and friction of the moving joints, and, if they were
-    /// identified, springs and tilt as `[learned]` and the compliance of the joints. Terms that `of` had learned are removed: the
-    /// fit explains the whole torque. All other text is unchanged. `ripple`, if given, replaces the motors' tables.
+    /// identified, springs and tilt as `[learned]` and the compliance of the joints. The fit explains the whole torque of the
+    /// joints that moved: they keep no learned terms and no compliance of `of`, and its payload and tilt, which act on
+    /// several joints, are removed; terms of the other joints stay. All other text is unchanged. `ripple`, if given, replaces
+    /// the motors' tables.
     ///
     /// # Errors
     /// [`SaveError`].
@@ -45,16 +48,33 @@ impl<const N: usize> Fit<N> {
             ripple,
             source: &source,
         })?;
-        let mut described = described.without_learned()?;
-        let effects = self.columns.effects();
-        if effects.compliance {
-            described = described.with_compliance(&self.compliance_rad_per_nm())?;
+        let (effects, given) = (self.columns.effects(), of.config::<N>()?);
+        let moves = |joint: usize| self.columns.moving().contains(&joint);
+        let found = self.compliance_rad_per_nm();
+        let compliance = core::array::from_fn::<f64, N, _>(|joint| match moves(joint) {
+            true => found[joint].max(0.0),
+            false => given.compliance_rad_per_nm[joint],
+        });
+        let described = match compliance == *given.compliance_rad_per_nm.as_slice() {
+            true => described,
+            false => described.with_compliance(&compliance)?,
+        };
+        if of.settings().learned.is_none() && !effects.springs && !effects.tilt {
+            return Ok(described);
         }
-        if effects.springs || effects.tilt {
-            let learned = self.learned(&described.config::<N>()?);
-            described = described.with_learned(&learned, "identified with the model")?;
+        let mut learned = self.learned(&described.config::<N>()?);
+        for joint in (0..N).filter(|joint| !moves(*joint)) {
+            let (to, from) = (&mut learned.parameters, &given.learned.parameters);
+            to.viscous_nm_s_per_rad[joint] = from.viscous_nm_s_per_rad[joint];
+            to.coulomb_nm[joint] = from.coulomb_nm[joint];
+            to.offset_nm[joint] = from.offset_nm[joint];
+            to.torque_scale[joint] = from.torque_scale[joint];
+            learned.map[joint] = given.learned.map[joint];
         }
-        Ok(described)
+        if learned == LearnedTerms::zero() {
+            return Ok(described);
+        }
+        Ok(described.with_learned(&learned, "identified with the model")?)
     }
 
     /// Collision thresholds for the modes with stiff joint loops, from the residual of the model on held-out motions

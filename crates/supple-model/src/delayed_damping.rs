@@ -19,6 +19,8 @@ use toml_edit::value;
 
 /// Damping rate times delay that a lower control rate leaves: three quarters of the limit.
 const MARGIN: f64 = 0.75 * FRAC_PI_2;
+/// Least share of the given gains to which they are reduced: an inertia that allows less is wrong.
+const MIN_SHARE: f64 = 0.3;
 /// Number of poses.
 const POSES: u32 = 100;
 const MUST: &str = "less: with the delay of this loop it shakes the joint in poses where the arm has little inertia";
@@ -48,7 +50,8 @@ impl Description {
     /// the delay of the loop ask for, a margin included; and the shares that are left of both, 1 for what is unchanged.
     ///
     /// # Errors
-    /// Any [`ModelError`] of the edited text.
+    /// As [`Description::completed`] if less than three tenths of the gains would be left: then an inertia is wrong; any
+    /// [`ModelError`] of the edited text.
     pub fn with_stable_damping<const N: usize>(
         &self,
     ) -> Result<(Description, [f64; 2]), ModelError> {
@@ -56,13 +59,21 @@ impl Description {
         if shares == [1.0; 2] {
             return Ok((self.clone(), shares));
         }
+        if shares.iter().any(|share| *share < MIN_SHARE) {
+            self.check_damping::<N>()?;
+        }
         let mut document = self.document()?;
         let mut reduced = self.clone();
         reduced.reduce_damping(shares);
         for (joint, of) in reduced.joints.iter().enumerate() {
             let table = self.joint_table(&mut document, joint)?;
-            let damping = of.gains.hold_damping_nm_s_per_rad;
-            put(table, "hold_damping_nm_s_per_rad", damping.into());
+            if shares[0] < 1.0 {
+                let damping = of.gains.hold_damping_nm_s_per_rad;
+                put(table, "hold_damping_nm_s_per_rad", damping.into());
+            }
+            if shares[1] == 1.0 {
+                continue;
+            }
             let held = table
                 .get_mut("held")
                 .and_then(|held| held.as_table_like_mut());

@@ -159,7 +159,7 @@ impl Description {
     ///
     /// # Errors
     /// Any [`ModelError`] of the edited text.
-    pub fn without_learned(&self) -> Result<Description, ModelError> {
+    fn without_learned(&self) -> Result<Description, ModelError> {
         if self.settings.learned.is_none() {
             return Ok(self.clone());
         }

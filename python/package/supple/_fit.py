@@ -125,7 +125,7 @@ class Fit:
 
     @property
     def arm(self) -> _native.Arm:
-        """The identified arm, with its friction.
+        """The identified arm, with its friction and, if identified, springs, tilt and compliance.
 
         Raises
         ------

@@ -135,8 +135,8 @@ def identify(
         Noise of each moving joint's torque (N m), instead of weights from residuals.
     effects : {"none", "auto"}
         ``"auto"`` identifies springs over the joints (hoses), tilt of the base, compliance, and friction of
-        motors that drive several joints, if cross-validation finds that they predict better. They become
-        part of ``Fit.arm()``.
+        motors that drive several joints, if cross-validation finds that they predict better; the tilt only if
+        all joints move. They become part of ``Fit.arm``, friction of motors as that of the joints.
     accept_wrong_logs : bool
         Whether to fit a log although its checks against ``arm`` found an error (units, signs, order, zeros,
         clock); what they found is then a warning.

@@ -151,14 +151,19 @@ impl<const N: usize> Controller<N> {
         }
     }
 
-    /// Change of the observed torque over that of a joint's angle, for an inertia of 1 kg m^2, when an encoder steps: the
-    /// estimated velocity of a step of 1 rad has its peak, `omega / e`, at `1 / omega` \[N m/(rad kg m^2)\].
+    /// Peak of the estimated velocity when an encoder steps, over the step, `omega / e`, at `1 / omega` after it \[1/s\].
+    pub(super) fn velocity_per_step(&self) -> f64 {
+        self.config.estimator_rad_per_s / core::f64::consts::E
+    }
+
+    /// Change of the observed torque when an encoder steps, over the step, for an inertia of 1 kg m^2 \[N m/(rad kg m^2)\].
     pub(super) fn observed_per_step(&self) -> f64 {
-        let (estimator, observer) = (
-            self.config.estimator_rad_per_s,
-            self.config.latch.observer_rad_per_s,
-        );
-        estimator / core::f64::consts::E * observer
+        self.velocity_per_step() * self.config.latch.observer_rad_per_s
+    }
+
+    /// Time after a step of an encoder from which the observed torque no longer shows it \[s\].
+    pub(super) fn observed_step_s(&self) -> f64 {
+        5.0 / self.config.estimator_rad_per_s + 2.0 / self.config.latch.observer_rad_per_s
     }
 
     /// Damping of each joint in the null space of the position task \[N m s/rad\]: that of the law, or as much

@@ -87,6 +87,14 @@ pub(super) struct StuckEncoders<const N: usize> {
     contact_cycles: u32,
 }
 
+/// What a step of an encoder adds to the observed torque on its motor.
+pub(super) struct StepEffect<F> {
+    /// Torque over the step, by encoder \[N m/rad\].
+    pub nm_per_rad: F,
+    /// Time after the step in which it shows \[s\].
+    pub lasts_s: f64,
+}
+
 impl<const N: usize> Default for StuckEncoders<N> {
     fn default() -> Self {
         StuckEncoders {
@@ -138,6 +146,13 @@ impl<const N: usize> StuckEncoders<N> {
             let changes = encoders.of(joint).map(|of| self.min_change_rad[of]);
             changes.fold(0.0, f64::max).min(MAX_RESOLUTION_RAD)
         })
+    }
+
+    /// Whether the external torque on its motor is beyond this limit, and has grown by as much since the encoder stopped.
+    fn grows(&self, encoder: usize, torque_nm: f64, limit_nm: f64) -> bool {
+        let stopped_at_nm = self.external_nm[encoder];
+        abs(torque_nm) > limit_nm.max(abs(stopped_at_nm))
+            && abs(torque_nm - stopped_at_nm) > limit_nm
     }
 
     /// Smallest change of an encoder, its resolution; zero if all have been greater than [`MAX_RESOLUTION_RAD`] \[rad\].
@@ -278,8 +293,9 @@ impl<const N: usize> StuckEncoders<N> {
 
     /// Reports a stuck encoder if it is unchanged although the external torque on its motor has grown beyond
     /// `stiction_limit_nm`, what dry friction holds, for some time. A torque that was that large when the encoder stopped may be
-    /// that of an obstacle. `step_nm_per_rad` is what a step of an encoder adds to the observed torque \[N m/rad\]: that after its
-    /// last step differs by so much from the true one. After [`StuckEncoders::check_sudden_stop`] of the same cycle.
+    /// that of an obstacle. While the observed torque shows the last step of the encoder, growth by so much does not count, and is
+    /// no growth later.
+    /// After [`StuckEncoders::check_sudden_stop`] of the same cycle.
     #[inline(never)]
     pub fn check_torque(
         &mut self,
@@ -287,7 +303,7 @@ impl<const N: usize> StuckEncoders<N> {
         plausible: &PlausibilityLimits,
         external_nm: &Vector<N>,
         stiction_limit_nm: &Vector<N>,
-        step_nm_per_rad: impl Fn(usize) -> f64,
+        step: &StepEffect<impl Fn(usize) -> f64>,
         elapsed_s: f64,
     ) -> Result<(), Fault> {
         for encoder in (0..N).filter(|encoder| self.unchanged[*encoder]) {
@@ -295,12 +311,20 @@ impl<const N: usize> StuckEncoders<N> {
             if self.unchanged_s[encoder] <= elapsed_s {
                 (self.external_nm[encoder], self.loaded_s[encoder]) = (torque_nm, 0.0);
             }
-            let stopped_at_nm = self.external_nm[encoder];
-            let (value_nm, limit_nm) = (abs(torque_nm), stiction_limit_nm[encoder]);
-            let growth_nm = abs(torque_nm - stopped_at_nm);
-            let grows = value_nm > limit_nm.max(abs(stopped_at_nm))
-                && growth_nm > limit_nm
-                && growth_nm > limit_nm + self.step_rad(encoder) * step_nm_per_rad(encoder);
+            let unchanged_s = self.unchanged_s[encoder];
+            let limit_nm = stiction_limit_nm[encoder];
+            let shows_step = unchanged_s <= step.lasts_s;
+            let mut grows = self.grows(encoder, torque_nm, limit_nm);
+            if grows && shows_step {
+                let step_nm = self.step_rad(encoder) * (step.nm_per_rad)(encoder);
+                grows = abs(torque_nm - self.external_nm[encoder]) > limit_nm + step_nm;
+            } else if !shows_step && unchanged_s - elapsed_s <= step.lasts_s {
+                let step_nm = self.step_rad(encoder) * (step.nm_per_rad)(encoder);
+                let change_nm = torque_nm - self.external_nm[encoder];
+                self.external_nm[encoder] += change_nm.clamp(-step_nm, step_nm);
+                grows = self.grows(encoder, torque_nm, limit_nm);
+            }
+            let value_nm = abs(torque_nm);
             self.loaded_s[encoder] = match grows {
                 true => self.loaded_s[encoder] + elapsed_s,
                 false => 0.0,

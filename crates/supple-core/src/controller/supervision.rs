@@ -11,6 +11,7 @@ use super::plausibility::{JointMotion, PlausibilityInput, falls, joint_collision
 use super::pose_task::PoseCycle;
 use super::position_limits::PositionLimits;
 use super::state::State;
+use super::stuck_encoder::StepEffect;
 use crate::config::Config;
 use crate::law::impedance::{SINGULAR_BELOW_M, Task};
 use crate::law::learned::LearnedAtPose;
@@ -25,6 +26,8 @@ const ACTIVATION_S: f64 = 0.05;
 const ACTIVATION_RATIO: f64 = 2.0;
 /// Time for which a swing exceeds the thresholds at most \[s\]. What exceeds them for longer is a collision all the same.
 const SWING_S: f64 = 0.008;
+/// Steps of an encoder whose estimated speed a joint at rest may show.
+const NOISE_STEPS: f64 = 2.0;
 
 /// Whether the pose is regular, so that the tip force can be estimated from the joint torques.
 fn is_regular<const N: usize>(task: &Task<N>) -> bool {
@@ -333,9 +336,13 @@ impl<const N: usize> State<N> {
                     &config.plausible,
                     &external_nm,
                     controller.stiction_limit_nm(),
-                    |encoder| {
-                        let inertia_kg_m2 = encoders.inertia_at(encoder, &self.terms.mass_matrix);
-                        inertia_kg_m2 * controller.observed_per_step()
+                    &StepEffect {
+                        nm_per_rad: |encoder| {
+                            let mass_matrix = &self.terms.mass_matrix;
+                            encoders.inertia_at(encoder, mass_matrix)
+                                * controller.observed_per_step()
+                        },
+                        lasts_s: controller.observed_step_s(),
                     },
                     evidence.elapsed_s,
                 )?;
@@ -352,9 +359,16 @@ impl<const N: usize> State<N> {
                 evidence.elapsed_s,
             );
             let limits_rad_per_s = &config.limits.joint_speed_rad_per_s;
-            let steady = self
-                .oscillation
-                .check(velocity, limits_rad_per_s, evidence.elapsed_s);
+            let noise_rad_per_s = |joint: usize| {
+                let resolution_rad = stuck.resolution_rad(encoders)[joint];
+                NOISE_STEPS * resolution_rad * controller.velocity_per_step()
+            };
+            let steady = self.oscillation.check(
+                velocity,
+                limits_rad_per_s,
+                noise_rad_per_s,
+                evidence.elapsed_s,
+            );
             // Not checked in a fault: a stopping arm may be pushed back, and `stop.rs` supervises
             // the stop.
             if !matches!(self.activity, Activity::Fault(_)) {

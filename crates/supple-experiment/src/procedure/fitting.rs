@@ -4,12 +4,11 @@ use super::error::ProcedureError;
 use super::progress::FitQuality;
 use crate::breakaway::JointBreakaway;
 use crate::calibrate::{FitOptions, SLOW_RAD_PER_S, identify_with, with_ripple_torque};
-use crate::residual_error::{ErrorInterval, error_interval_of};
+use crate::residual_error::{ErrorInterval, error_interval_of, feedforward_residual_nm};
 use crate::scenario::STIFFNESS_N_PER_M;
 use nalgebra::DMatrix;
 use std::path::Path;
 use supple_core::controller::Mode;
-use supple_core::dynamics::rnea;
 use supple_core::{Config, Vector};
 use supple_ident::{Fit, FrictionColumns, Log, Motion, ReadError};
 use supple_log::Reader;
@@ -106,12 +105,17 @@ pub fn scale_dry_friction<const N: usize>(
         }
         friction
     });
-    Ok(model.with_model(&IdentifiedModel {
+    let source = "dry friction scaled to measured breakaway torques";
+    let scaled = model.with_model(&IdentifiedModel {
         arm: &config.arm,
         friction: &friction,
         ripple: None,
-        source: "dry friction scaled to measured breakaway torques",
-    })?)
+        source,
+    })?;
+    match model.settings().learned {
+        Some(_) => Ok(scaled.with_learned(&config.learned, source)?),
+        None => Ok(scaled),
+    }
 }
 
 /// Reads the motions of a log without contact, of at least 2 s in a mode with a reference, in which every joint moves; empty if
@@ -292,23 +296,13 @@ fn quality<const N: usize>(
     motion: &Motion,
 ) -> Result<FitQuality, ProcedureError> {
     let validation = fit.validate_motion(motion)?;
-    let (mut error, mut torque) = (0.0, 0.0);
-    for row in 0..motion.samples() {
-        let at = |m: &DMatrix<f64>| Vector::<N>::from_fn(|j, _| m[(row, j)]);
-        let (q, qd, qdd, tau) = (
-            at(&motion.q),
-            at(&motion.qd),
-            at(&motion.qdd),
-            at(&motion.tau),
-        );
-        let friction = Vector::from_fn(|j, _| before.friction[j].torque_nm(qd[j]));
-        error += (rnea(&before.arm, &q, &qd, &qdd) + friction - tau).norm_squared();
-        torque += tau.norm_squared();
-    }
+    let joints: Vec<usize> = (0..N).collect();
+    let error = feedforward_residual_nm(before, &joints, motion).norm();
+    let torque = motion.tau.norm();
     Ok(FitQuality {
         training_relative: fit.training_relative,
         validation_relative: validation.total_relative,
-        validation_relative_before: (error / torque.max(f64::MIN_POSITIVE)).sqrt(),
+        validation_relative_before: error / torque.max(f64::MIN_POSITIVE),
         validation_rms_nm: validation.rms_nm.clone(),
         verdict: validation.verdict(),
         interval_at_5_n_per_m: None,

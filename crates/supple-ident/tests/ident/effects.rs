@@ -7,7 +7,8 @@ use supple_core::{Arm, Config, Friction, Vector};
 use supple_ident::columns::Column;
 use supple_ident::regressor::rows;
 use supple_ident::{
-    Columns, DMatrix, Effects, FrictionColumns, Motion, Options, fit, presliding_rad,
+    Columns, DMatrix, Effects, FrictionColumns, Learning, Motion, Options, fit, learn,
+    presliding_rad,
 };
 use supple_model::Description;
 
@@ -204,6 +205,60 @@ fn description_of_a_fit_has_its_effects_and_no_older_ones() {
         LearnedTerms::zero()
     );
     assert!(!described.toml().contains("[learned"));
+}
+
+/// A fit of some joints leaves compliance and springs of the others as they were.
+#[test]
+fn description_of_a_fit_of_some_joints_keeps_the_terms_of_the_others() {
+    let nominal = Description::asset("wam4").unwrap();
+    let mut older = LearnedTerms::<4>::zero();
+    for map in &mut older.map {
+        map.torque_nm = [0.1; 16];
+    }
+    older.parameters.tilt_rad.x = 0.01;
+    let given = nominal.with_compliance(&[1e-4; 4]).unwrap();
+    let given = given.with_learned(&older, "an older run").unwrap();
+    let config = given.config::<4>().unwrap();
+    let motion = spring_motion(&config, 0.3);
+    let options = Options {
+        consistent_prior_weight: Some(1e-4),
+        ..Options::default()
+    };
+    let found = fit(&config.arm, &[motion], &[1, 3], &options).unwrap();
+    let result = found.description(&given, None).unwrap();
+    let result = result.config::<4>().unwrap();
+    assert_eq!(
+        result.compliance_rad_per_nm.as_slice(),
+        [1e-4, 0.0, 1e-4, 0.0]
+    );
+    let values = result.learned.map.map(|map| map.torque_nm[3]);
+    assert_eq!(values, [0.1, 0.0, 0.1, 0.0]);
+    assert_eq!(result.learned.parameters.tilt_rad.x, 0.0);
+}
+
+/// Learning from a repeated motion takes springs and compliance into account, and keeps them.
+#[test]
+fn learning_friction_keeps_the_springs() {
+    let nominal = Description::asset("wam4").unwrap();
+    let motion = spring_motion(&wam4(), 0.1);
+    let options = Options {
+        effects: Effects {
+            springs: true,
+            ..Effects::default()
+        },
+        consistent_prior_weight: Some(1e-4),
+        ..Options::default()
+    };
+    let found = fit(&wam4().arm, core::slice::from_ref(&motion), &ALL, &options).unwrap();
+    let described = found.description(&nominal, None).unwrap();
+    let config = described.config::<4>().unwrap();
+    let learnt = learn(&config, &[motion], &ALL, &Learning::default()).unwrap();
+    for j in ALL {
+        let ratio = learnt.friction[j].coulomb_nm / config.friction[j].coulomb_nm;
+        assert!((ratio - 1.0).abs() < 0.05, "joint {j}: {ratio}");
+    }
+    let after = learnt.description(&described).unwrap();
+    assert_eq!(after.config::<4>().unwrap().learned, config.learned);
 }
 
 /// Friction that turns round over a travel: the travel is found; friction by the sign of the velocity has none.

@@ -4,7 +4,7 @@ use crate::support::motion;
 use supple_core::dynamics::{gravity, rnea, tip_pose};
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::ripple::Harmonic;
-use supple_core::{Body, Friction, Matrix, RippleTable, Vector};
+use supple_core::{Body, Config, Friction, Matrix, RippleTable, Vector};
 use supple_ident::design::{
     Criterion, DesignOptions, Workspace, constant_speed_series, design, slow_series,
 };
@@ -249,7 +249,11 @@ fn a_friction_error_of_10_percent_is_learnt_from_the_residual() {
     });
     let moving = [1, 3];
     let data = motion(&arm, &truth, &moving, 1500, 12);
-    let learnt = learn(&arm, &model, &[data], &moving, &Learning::default()).unwrap();
+    let config = Config {
+        friction: model,
+        ..wam4()
+    };
+    let learnt = learn(&config, &[data], &moving, &Learning::default()).unwrap();
     for j in moving {
         let (got, wanted) = (&learnt.friction[j], &truth[j]);
         assert!((got.coulomb_nm / wanted.coulomb_nm - 1.0).abs() < 2e-3);
@@ -275,7 +279,8 @@ fn a_payload_is_learnt_together_with_friction() {
         payload_kg: Some(0.5),
         ..Learning::default()
     };
-    let learnt = learn(&arm, &friction, &[data], &ALL, &learning).unwrap();
+    let config = Config { friction, ..wam4() };
+    let learnt = learn(&config, &[data], &ALL, &learning).unwrap();
     let got = with_payload(&arm, learnt.payload.as_ref()).unwrap();
     let mut noise = Random::new(2);
     for _ in 0..30 {

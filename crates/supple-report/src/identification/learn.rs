@@ -7,7 +7,7 @@ use supple_cli::console::{print_json, print_line};
 use supple_cli::exit::Failure;
 use supple_experiment::calibrate::preparation;
 use supple_ident::{Learned, Learning, Log, Motion, learn, read_logs};
-use supple_model::{Description, IdentifiedModel, with_dof};
+use supple_model::{Description, with_dof};
 
 /// Cutoff frequency of the filter \[Hz\].
 const CUTOFF_HZ: f64 = 8.0;
@@ -61,15 +61,8 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &LearnArgs) -> Result<(
         payload_kg: args.payload,
         ..Learning::default()
     };
-    let learnt = learn(&config.arm, &config.friction, &motions, &moving, &learning)?;
-    let source = "friction learnt from repeated motion";
-    let changed = supple_ident::learn::with_payload(&config.arm, learnt.payload.as_ref())?;
-    let described = arm.with_model(&IdentifiedModel {
-        arm: &changed,
-        friction: &learnt.friction,
-        ripple: None,
-        source,
-    })?;
+    let learnt = learn(&config, &motions, &moving, &learning)?;
+    let described = learnt.description(arm)?;
     described.save(&args.out)?;
     let summary = summary(arm, &config.friction, &learnt);
     if args.json {

@@ -546,10 +546,21 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
 
     fn learned(&mut self) -> Result<Option<Description>, Failure> {
         let file = self.learned.join("arm.toml");
-        match file.exists() {
-            true => Ok(Some(Description::load(file)?)),
-            false => Ok(None),
+        if !file.exists() {
+            return Ok(None);
         }
+        let kept = Description::load(file)?;
+        // A system that runs already may have learned with another model.
+        if kept.urdf() != self.model.urdf() || kept.friction() != self.model.friction() {
+            return Ok(None);
+        }
+        let found = kept.config::<N>()?;
+        let source = kept.settings().learned.as_ref();
+        let source = source.and_then(|learned| learned.source.as_deref());
+        Ok(Some(self.model.with_learned(
+            &found.learned,
+            source.unwrap_or("learned while moving"),
+        )?))
     }
 
     fn meanwhile<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> Result<T, Failure> {

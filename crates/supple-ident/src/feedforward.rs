@@ -1,0 +1,60 @@
+//! Torques of a controller's feed-forward in a motion: links and friction, compliance and learned terms.
+//!
+//! Not those of a fit, which has terms that a controller takes at their mean, such as friction that grows with the load.
+
+use crate::motion::Motion;
+use nalgebra::DMatrix;
+use supple_core::dynamics::{Terms, terms};
+use supple_core::learned::LearnedBounds;
+use supple_core::learned_torque::{LearnedAtPose, learned_torque_nm};
+use supple_core::math::Vector3;
+use supple_core::{Config, Vector};
+
+/// Feed-forward of a controller with this configuration along a motion, (samples, N) \[N m\].
+pub fn feedforward_nm<const N: usize>(config: &Config<N>, motion: &Motion) -> DMatrix<f64> {
+    each_sample(config, motion, |_, whole| whole)
+}
+
+/// What compliance and learned terms add to the torques of links and friction along a motion, (samples, N) \[N m\].
+pub(crate) fn effects_nm<const N: usize>(config: &Config<N>, motion: &Motion) -> DMatrix<f64> {
+    each_sample(config, motion, |plain, whole| whole - plain)
+}
+
+/// A torque for each sample, from that of links and friction at the encoders' angles and the whole one.
+fn each_sample<const N: usize>(
+    config: &Config<N>,
+    motion: &Motion,
+    of: impl Fn(Vector<N>, Vector<N>) -> Vector<N>,
+) -> DMatrix<f64> {
+    let bounds = LearnedBounds::new(&config.friction, &config.limits.joint_torque_nm);
+    let mut torque_nm = DMatrix::zeros(motion.samples(), N);
+    let mut at_pose = Terms::default();
+    for sample in 0..motion.samples() {
+        let at = |m: &DMatrix<f64>| Vector::<N>::from_fn(|j, _| m[(sample, j)]);
+        let (encoder, qd, qdd) = (at(&motion.q), at(&motion.qd), at(&motion.qdd));
+        let friction = Vector::from_fn(|j, _| config.friction[j].torque_nm(qd[j]));
+        let inverse_dynamics =
+            |terms: &Terms<N>| terms.mass_matrix * qdd + terms.coriolis_gravity + friction;
+        terms(&config.arm, &encoder, &qd, &mut at_pose);
+        let plain = inverse_dynamics(&at_pose);
+        let q = encoder - config.compliance_rad_per_nm.component_mul(&at_pose.gravity);
+        terms(&config.arm, &q, &qd, &mut at_pose);
+        let model = inverse_dynamics(&at_pose);
+        let learned = LearnedAtPose::new(
+            &config.learned,
+            &config.friction,
+            &config.limits,
+            &config.arm.gravity(),
+            &q,
+            &at_pose,
+            &Vector3::zeros(),
+        );
+        let change = learned.torque_nm(&config.learned, &config.friction, &qd, None, 1.0);
+        let whole = model + learned_torque_nm(&config.learned, &bounds, &model, &change);
+        let row = of(plain, whole);
+        for joint in 0..N {
+            torque_nm[(sample, joint)] = row[joint];
+        }
+    }
+    torque_nm
+}
