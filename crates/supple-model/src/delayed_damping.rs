@@ -173,7 +173,7 @@ mod tests {
 
         let light = wam4
             .toml()
-            .replace("armature_kg_m2 = 0.06691", "armature_kg_m2 = 0.01");
+            .replace("armature_kg_m2 = 0.06691", "armature_kg_m2 = 0.03");
         assert_ne!(light, wam4.toml());
         let light = Description::from_text(&light, wam4.urdf()).expect("a description");
         let refused = light.completed().expect_err("it shakes").to_string();

@@ -22,6 +22,27 @@ pub struct Encoders<const N: usize> {
     to_joint: Matrix<N, N>,
 }
 
+/// What the step of an encoder does to the estimates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct EncoderStep {
+    /// Change of the observed torque over the step, for an inertia of 1 kg m^2 \[N m/(rad kg m^2)\].
+    pub observed_per_s2: f64,
+    /// Time after the step from which the observed torque no longer shows it \[s\].
+    pub lasts_s: f64,
+}
+
+impl EncoderStep {
+    /// For the bandwidths of the velocity estimate and of the observer.
+    pub fn new(estimator_rad_per_s: f64, observer_rad_per_s: f64) -> EncoderStep {
+        // Peak of the estimated velocity over the step, at `1 / omega` after it.
+        let velocity_per_s = estimator_rad_per_s / core::f64::consts::E;
+        EncoderStep {
+            observed_per_s2: velocity_per_s * observer_rad_per_s,
+            lasts_s: 5.0 / estimator_rad_per_s + 2.0 / observer_rad_per_s,
+        }
+    }
+}
+
 impl<const N: usize> Encoders<N> {
     pub(super) fn new(joint_from_motor: &Matrix<N, N>, motor_from_joint: &Matrix<N, N>) -> Self {
         let drives = core::array::from_fn(|joint| {

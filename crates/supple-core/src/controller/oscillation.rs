@@ -13,9 +13,9 @@ const TURNED_RAD_PER_S: f64 = 0.04;
 const MAX_SWING_S: f64 = 0.08;
 /// Times in a row that the peak grows until it is a fault.
 const GROWTHS: u32 = 3;
-/// Largest ratio of a peak to one before it that may be noise: a joint that begins to move has a greater ratio to the swings that
-/// its encoder shows at rest.
-const MAX_GROWTH_FROM_NOISE: f64 = 3.0;
+/// Largest ratio of a peak to the one before: a joint that begins to move has a greater one to the swings that the noise of its
+/// encoder shows at rest. A loop whose delay is 2.5 times what its gains allow grows faster; the limit of the speed ends that.
+const MAX_GROWTH: f64 = 3.0;
 /// Peak as a fraction of the speed limit.
 const SPEED_SHARE: f64 = 0.15;
 
@@ -47,14 +47,12 @@ impl<const N: usize> Default for Oscillation<N> {
 }
 
 impl<const N: usize> Oscillation<N> {
-    /// Adds the velocities of a cycle \[rad/s\]. An error if a joint oscillates; `limit_rad_per_s` are the speed limits,
-    /// `noise_rad_per_s` is the speed up to which that of a joint at rest may seem to swing.
+    /// Adds the velocities of a cycle \[rad/s\]. An error if a joint oscillates; `limit_rad_per_s` are the speed limits.
     #[inline(always)]
     pub fn check(
         &mut self,
         velocity_rad_per_s: &Vector<N>,
         limit_rad_per_s: &Vector<N>,
-        noise_rad_per_s: impl Fn(usize) -> f64,
         elapsed_s: f64,
     ) -> Result<(), Fault> {
         self.now_s += elapsed_s;
@@ -62,12 +60,11 @@ impl<const N: usize> Oscillation<N> {
         for joint in 0..N {
             let (velocity, fastest) = (velocity_rad_per_s[joint], self.fastest_rad_per_s[joint]);
             if velocity * fastest < -TURNED_RAD_PER_S * abs(fastest) {
-                self.end_swing(joint, velocity, noise_rad_per_s(joint));
+                self.end_swing(joint, velocity);
             } else if abs(velocity) > abs(fastest) {
                 self.fastest_rad_per_s[joint] = velocity;
                 if self.growths[joint] >= GROWTHS - 1 {
-                    let noise = noise_rad_per_s(joint);
-                    result = result.and(self.judge_swing(joint, limit_rad_per_s[joint], noise));
+                    result = result.and(self.judge_swing(joint, limit_rad_per_s[joint]));
                 }
             }
         }
@@ -77,9 +74,9 @@ impl<const N: usize> Oscillation<N> {
     /// Ends a swing of a joint.
     #[cold]
     #[inline(never)]
-    fn end_swing(&mut self, joint: usize, velocity: f64, noise_rad_per_s: f64) {
+    fn end_swing(&mut self, joint: usize, velocity: f64) {
         let peak = abs(self.fastest_rad_per_s[joint]);
-        self.growths[joint] = match self.has_grown(joint, peak, noise_rad_per_s) {
+        self.growths[joint] = match self.has_grown(joint, peak) {
             true => self.growths[joint] + 1,
             false => 0,
         };
@@ -88,29 +85,20 @@ impl<const N: usize> Oscillation<N> {
         self.fastest_rad_per_s[joint] = velocity;
     }
 
-    /// Whether this peak is that of a quick swing, and higher than the last one, by at most [`MAX_GROWTH_FROM_NOISE`] if that
-    /// may have been noise.
-    fn has_grown(&self, joint: usize, peak: f64, noise_rad_per_s: f64) -> bool {
+    /// Whether this peak is that of a quick swing, and higher than the last one by at most [`MAX_GROWTH`].
+    fn has_grown(&self, joint: usize, peak: f64) -> bool {
         let is_quick = self.now_s - self.turned_s[joint] <= MAX_SWING_S;
         let last_peak = self.last_peak_rad_per_s[joint];
-        let from_noise = last_peak <= noise_rad_per_s && peak > MAX_GROWTH_FROM_NOISE * last_peak;
-        is_quick && peak > last_peak && !from_noise
+        is_quick && peak > last_peak && peak <= MAX_GROWTH * last_peak
     }
 
     /// Judges a swing that may be the last of those that grow, before it ends.
     #[cold]
     #[inline(never)]
-    fn judge_swing(
-        &self,
-        joint: usize,
-        speed_limit: f64,
-        noise_rad_per_s: f64,
-    ) -> Result<(), Fault> {
+    fn judge_swing(&self, joint: usize, speed_limit: f64) -> Result<(), Fault> {
         let value_rad_per_s = abs(self.fastest_rad_per_s[joint]);
         let limit_rad_per_s = SPEED_SHARE * speed_limit;
-        if self.has_grown(joint, value_rad_per_s, noise_rad_per_s)
-            && value_rad_per_s > limit_rad_per_s
-        {
+        if self.has_grown(joint, value_rad_per_s) && value_rad_per_s > limit_rad_per_s {
             return Err(Fault::Oscillation {
                 joint,
                 value_rad_per_s,

@@ -1,6 +1,6 @@
 //! A configuration, checked, with the constants that every step takes from it.
 
-use super::encoders::Encoders;
+use super::encoders::{EncoderStep, Encoders};
 use super::estimator::EstimatorGains;
 use super::limiter::MotorGroups;
 use super::nullspace::nullspace_damping_nm_s_per_rad;
@@ -35,6 +35,7 @@ pub struct Controller<const N: usize> {
     pub(super) has_compliance: bool,
     /// The estimator's gains after one period.
     pub(super) one_period: EstimatorGains,
+    encoder_step: EncoderStep,
     pub(super) torque_step_nm: Vector<N>,
     /// Weights of squared external torques whose sum exceeds one where something pushes the arm \[1/(N m)^2\].
     pub(super) large_torque_weight_per_nm2: Vector<N>,
@@ -90,6 +91,10 @@ impl<const N: usize> Controller<N> {
             has_presliding: config.friction.iter().any(|f| f.presliding_rad > 0.0),
             has_compliance: config.compliance_rad_per_nm != Vector::<N>::zeros(),
             one_period: EstimatorGains::new(config.period_s, config.estimator_rad_per_s),
+            encoder_step: EncoderStep::new(
+                config.estimator_rad_per_s,
+                config.latch.observer_rad_per_s,
+            ),
             torque_step_nm: config.limits.torque_rate_nm_per_s * config.period_s,
             large_torque_weight_per_nm2: limits.joint_torque_nm.map(|limit_nm| {
                 let large_nm = LARGE_TORQUE_SHARE * limit_nm;
@@ -151,19 +156,9 @@ impl<const N: usize> Controller<N> {
         }
     }
 
-    /// Peak of the estimated velocity when an encoder steps, over the step, `omega / e`, at `1 / omega` after it \[1/s\].
-    pub(super) fn velocity_per_step(&self) -> f64 {
-        self.config.estimator_rad_per_s / core::f64::consts::E
-    }
-
-    /// Change of the observed torque when an encoder steps, over the step, for an inertia of 1 kg m^2 \[N m/(rad kg m^2)\].
-    pub(super) fn observed_per_step(&self) -> f64 {
-        self.velocity_per_step() * self.config.latch.observer_rad_per_s
-    }
-
-    /// Time after a step of an encoder from which the observed torque no longer shows it \[s\].
-    pub(super) fn observed_step_s(&self) -> f64 {
-        5.0 / self.config.estimator_rad_per_s + 2.0 / self.config.latch.observer_rad_per_s
+    /// What the step of an encoder does to the estimates.
+    pub(super) fn encoder_step(&self) -> &EncoderStep {
+        &self.encoder_step
     }
 
     /// Damping of each joint in the null space of the position task \[N m s/rad\]: that of the law, or as much

@@ -88,9 +88,9 @@ pub(super) struct StuckEncoders<const N: usize> {
 }
 
 /// What a step of an encoder adds to the observed torque on its motor.
-pub(super) struct StepEffect<F> {
-    /// Torque over the step, by encoder \[N m/rad\].
-    pub nm_per_rad: F,
+pub(super) struct StepEffect {
+    /// Torque over the step \[N m/rad\].
+    pub nm_per_rad: f64,
     /// Time after the step in which it shows \[s\].
     pub lasts_s: f64,
 }
@@ -148,11 +148,37 @@ impl<const N: usize> StuckEncoders<N> {
         })
     }
 
-    /// Whether the external torque on its motor is beyond this limit, and has grown by as much since the encoder stopped.
-    fn grows(&self, encoder: usize, torque_nm: f64, limit_nm: f64) -> bool {
+    /// Adds a cycle to the time for which an external torque beyond the limit has grown by as much since the encoder stopped.
+    #[cold]
+    #[inline(never)]
+    fn add_load(
+        &mut self,
+        encoder: usize,
+        torque_nm: f64,
+        limit_nm: f64,
+        step: &impl Fn(usize) -> StepEffect,
+        elapsed_s: f64,
+    ) {
+        let step = step(encoder);
+        let unchanged_s = self.unchanged_s[encoder];
+        let mut beyond_nm = limit_nm;
+        if unchanged_s - elapsed_s <= step.lasts_s {
+            let step_nm = self.step_rad(encoder) * step.nm_per_rad;
+            if unchanged_s <= step.lasts_s {
+                beyond_nm += step_nm;
+            } else {
+                // The step no longer shows: what the torque was when the encoder stopped is now known without it.
+                let change_nm = torque_nm - self.external_nm[encoder];
+                self.external_nm[encoder] += change_nm.clamp(-step_nm, step_nm);
+            }
+        }
         let stopped_at_nm = self.external_nm[encoder];
-        abs(torque_nm) > limit_nm.max(abs(stopped_at_nm))
-            && abs(torque_nm - stopped_at_nm) > limit_nm
+        let grows =
+            abs(torque_nm) > abs(stopped_at_nm) && abs(torque_nm - stopped_at_nm) > beyond_nm;
+        self.loaded_s[encoder] = match grows {
+            true => self.loaded_s[encoder] + elapsed_s,
+            false => 0.0,
+        };
     }
 
     /// Smallest change of an encoder, its resolution; zero if all have been greater than [`MAX_RESOLUTION_RAD`] \[rad\].
@@ -303,37 +329,28 @@ impl<const N: usize> StuckEncoders<N> {
         plausible: &PlausibilityLimits,
         external_nm: &Vector<N>,
         stiction_limit_nm: &Vector<N>,
-        step: &StepEffect<impl Fn(usize) -> f64>,
+        step: impl Fn(usize) -> StepEffect,
         elapsed_s: f64,
     ) -> Result<(), Fault> {
-        for encoder in (0..N).filter(|encoder| self.unchanged[*encoder]) {
+        for encoder in 0..N {
+            if !self.unchanged[encoder] {
+                continue;
+            }
             let torque_nm = encoders.torque_at(encoder, external_nm);
             if self.unchanged_s[encoder] <= elapsed_s {
                 (self.external_nm[encoder], self.loaded_s[encoder]) = (torque_nm, 0.0);
             }
-            let unchanged_s = self.unchanged_s[encoder];
             let limit_nm = stiction_limit_nm[encoder];
-            let shows_step = unchanged_s <= step.lasts_s;
-            let mut grows = self.grows(encoder, torque_nm, limit_nm);
-            if grows && shows_step {
-                let step_nm = self.step_rad(encoder) * (step.nm_per_rad)(encoder);
-                grows = abs(torque_nm - self.external_nm[encoder]) > limit_nm + step_nm;
-            } else if !shows_step && unchanged_s - elapsed_s <= step.lasts_s {
-                let step_nm = self.step_rad(encoder) * (step.nm_per_rad)(encoder);
-                let change_nm = torque_nm - self.external_nm[encoder];
-                self.external_nm[encoder] += change_nm.clamp(-step_nm, step_nm);
-                grows = self.grows(encoder, torque_nm, limit_nm);
+            if abs(torque_nm) <= limit_nm {
+                self.loaded_s[encoder] = 0.0;
+                continue;
             }
-            let value_nm = abs(torque_nm);
-            self.loaded_s[encoder] = match grows {
-                true => self.loaded_s[encoder] + elapsed_s,
-                false => 0.0,
-            };
+            self.add_load(encoder, torque_nm, limit_nm, &step, elapsed_s);
             if self.loaded_s[encoder] > LOADED_LIMIT_S && plausible.stuck_rad < f64::MAX {
                 let joint = encoders.joint(encoder);
                 return Err(Fault::EncoderUnmoved {
                     joint,
-                    value_nm,
+                    value_nm: abs(torque_nm),
                     limit_nm,
                 });
             }

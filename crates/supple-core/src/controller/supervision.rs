@@ -26,8 +26,6 @@ const ACTIVATION_S: f64 = 0.05;
 const ACTIVATION_RATIO: f64 = 2.0;
 /// Time for which a swing exceeds the thresholds at most \[s\]. What exceeds them for longer is a collision all the same.
 const SWING_S: f64 = 0.008;
-/// Steps of an encoder whose estimated speed a joint at rest may show.
-const NOISE_STEPS: f64 = 2.0;
 
 /// Whether the pose is regular, so that the tip force can be estimated from the joint torques.
 fn is_regular<const N: usize>(task: &Task<N>) -> bool {
@@ -336,13 +334,14 @@ impl<const N: usize> State<N> {
                     &config.plausible,
                     &external_nm,
                     controller.stiction_limit_nm(),
-                    &StepEffect {
-                        nm_per_rad: |encoder| {
-                            let mass_matrix = &self.terms.mass_matrix;
-                            encoders.inertia_at(encoder, mass_matrix)
-                                * controller.observed_per_step()
-                        },
-                        lasts_s: controller.observed_step_s(),
+                    |encoder| {
+                        let (step, mass_matrix) =
+                            (controller.encoder_step(), &self.terms.mass_matrix);
+                        StepEffect {
+                            nm_per_rad: encoders.inertia_at(encoder, mass_matrix)
+                                * step.observed_per_s2,
+                            lasts_s: step.lasts_s,
+                        }
                     },
                     evidence.elapsed_s,
                 )?;
@@ -359,16 +358,9 @@ impl<const N: usize> State<N> {
                 evidence.elapsed_s,
             );
             let limits_rad_per_s = &config.limits.joint_speed_rad_per_s;
-            let noise_rad_per_s = |joint: usize| {
-                let resolution_rad = stuck.resolution_rad(encoders)[joint];
-                NOISE_STEPS * resolution_rad * controller.velocity_per_step()
-            };
-            let steady = self.oscillation.check(
-                velocity,
-                limits_rad_per_s,
-                noise_rad_per_s,
-                evidence.elapsed_s,
-            );
+            let steady = self
+                .oscillation
+                .check(velocity, limits_rad_per_s, evidence.elapsed_s);
             // Not checked in a fault: a stopping arm may be pushed back, and `stop.rs` supervises
             // the stop.
             if !matches!(self.activity, Activity::Fault(_)) {
