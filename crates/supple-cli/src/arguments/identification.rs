@@ -200,7 +200,7 @@ pub struct IdentifyArgs {
     #[arg(long, value_enum, default_value = "auto")]
     pub friction: FrictionArg,
     /// Springs over the joints (hoses, wires), tilt of the base, compliance, and friction of motors that drive several joints:
-    /// all of them if cross-validation finds that they predict better. Default: auto for MCAP, none for CSV.
+    /// none, all but the compliance, or all, by cross-validation. Default: auto for MCAP, none for CSV.
     #[arg(long, value_enum)]
     pub effects: Option<EffectsArg>,
     /// Weight of the given arm, in equivalent observations. Default: chosen by cross-validation.

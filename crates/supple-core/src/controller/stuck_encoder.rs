@@ -169,7 +169,7 @@ impl<const N: usize> StuckEncoders<N> {
             } else {
                 // The step no longer shows: what the torque was when the encoder stopped is now known without it.
                 let change_nm = torque_nm - self.external_nm[encoder];
-                self.external_nm[encoder] += change_nm.clamp(-step_nm, step_nm);
+                self.external_nm[encoder] += change_nm.max(-step_nm).min(step_nm);
             }
         }
         let stopped_at_nm = self.external_nm[encoder];
@@ -320,8 +320,7 @@ impl<const N: usize> StuckEncoders<N> {
     /// Reports a stuck encoder if it is unchanged although the external torque on its motor has grown beyond
     /// `stiction_limit_nm`, what dry friction holds, for some time. A torque that was that large when the encoder stopped may be
     /// that of an obstacle. While the observed torque shows the last step of the encoder, growth by so much does not count, and is
-    /// no growth later.
-    /// After [`StuckEncoders::check_sudden_stop`] of the same cycle.
+    /// no growth later. After [`StuckEncoders::check_sudden_stop`] of the same cycle.
     #[inline(never)]
     pub fn check_torque(
         &mut self,

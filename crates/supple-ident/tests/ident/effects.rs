@@ -126,19 +126,23 @@ fn spring_motion(config: &Config<4>, stiffness: f64) -> Motion {
     }
 }
 
-/// A fit of an arm with a hose finds its stiffness, and the terms of the controller are its torque.
-#[test]
-fn spring_is_found_and_becomes_a_map() {
-    let (config, stiffness) = (wam4(), 0.3);
-    let motion = spring_motion(&config, stiffness);
-    let options = Options {
+fn springs() -> Options {
+    Options {
         effects: Effects {
             springs: true,
             ..Effects::default()
         },
         consistent_prior_weight: Some(1e-4),
         ..Options::default()
-    };
+    }
+}
+
+/// A fit of an arm with a hose finds its stiffness, and the terms of the controller are its torque.
+#[test]
+fn spring_is_found_and_becomes_a_map() {
+    let (config, stiffness) = (wam4(), 0.3);
+    let motion = spring_motion(&config, stiffness);
+    let options = springs();
     let found = fit(&config.arm, core::slice::from_ref(&motion), &ALL, &options).unwrap();
     let learned = found.learned(&config);
     for j in ALL {
@@ -241,14 +245,7 @@ fn description_of_a_fit_of_some_joints_keeps_the_terms_of_the_others() {
 fn learning_friction_keeps_the_springs() {
     let nominal = Description::asset("wam4").unwrap();
     let motion = spring_motion(&wam4(), 0.1);
-    let options = Options {
-        effects: Effects {
-            springs: true,
-            ..Effects::default()
-        },
-        consistent_prior_weight: Some(1e-4),
-        ..Options::default()
-    };
+    let options = springs();
     let found = fit(&wam4().arm, core::slice::from_ref(&motion), &ALL, &options).unwrap();
     let described = found.description(&nominal, None).unwrap();
     let config = described.config::<4>().unwrap();

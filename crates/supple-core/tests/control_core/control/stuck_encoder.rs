@@ -188,8 +188,8 @@ fn an_arm_stopped_by_braking_can_be_reenabled() {
 }
 
 /// Lets the reference of a law move away from a blocked arm in two seconds, whose joints yield by `yielding_rad` in each tenth of
-/// these cycles, and then not at all for a second; one motor of the differential also moves to and fro by `flicker_rad`, at first every 10 cycles, then
-/// every 50. The fault, and the force of the law before \[N\].
+/// these cycles, and then not at all for a second; one motor of the differential also moves to and fro by `flicker_rad`, at first
+/// every 10 cycles, then every 50. The fault, and the force of the law before \[N\].
 fn held_under_a_stiff_law(
     mut config: Config<4>,
     stiffness_n_per_m: f64,
