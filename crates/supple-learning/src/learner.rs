@@ -3,14 +3,15 @@
 use crate::freeze::Frozen;
 use crate::information::Information;
 use crate::prior::Prior;
+use crate::prior::unknowns::VISCOUS;
 use crate::report::Report;
-use crate::rows::Rows;
+use crate::rows::{Row, Rows};
 use crate::solve::{Estimate, of_prior, solve};
 use std::collections::VecDeque;
 use supple_core::controller::{CycleRecord, Request};
 use supple_core::learned::LearnedTerms;
 use supple_core::math::exp;
-use supple_core::{Config, Friction, Vector};
+use supple_core::{Config, Friction};
 
 /// When a joint gives equations: what its dry friction does in a reversal is not identifiable.
 #[derive(Clone, Copy, Debug)]
@@ -41,8 +42,9 @@ impl SpeedGate {
     }
 }
 
-/// Time between samples \[s\].
-const SAMPLE_S: f64 = 0.01;
+/// Time over which equations are averaged to a sample \[s\]. The noise of the velocity is that of a difference quotient:
+/// little of it is left in the mean, much in single cycles.
+const SAMPLE_S: f64 = 0.05;
 /// Time over which errors of the model are correlated: one sample of this time is independent \[s\].
 const CORRELATION_S: f64 = 0.2;
 /// Samples are collected, judged and used by intervals of this length \[s\].
@@ -88,10 +90,13 @@ pub struct Learner<const N: usize> {
     /// Time since the filters of all joints, and of each joint, may be relied on \[s\].
     since_freeze_s: f64,
     since_slow_s: [f64; N],
-    /// Velocity of the cycle before \[rad/s\].
-    last_velocity_rad_per_s: Vector<N>,
+    /// Filtered velocity of the cycle before \[rad/s\].
+    last_velocity_rad_per_s: [f64; N],
     speed_gate: [SpeedGate; N],
-    cycles_to_sample: u32,
+    /// Sum of each joint's equations since the last sample, and their number; `None` once one of them may not be used.
+    sums: Vec<Option<Row>>,
+    summed: u32,
+    cycles_per_sample: u32,
     interval_s: f64,
     collecting: Vec<Information>,
     waiting: VecDeque<Vec<Information>>,
@@ -117,9 +122,11 @@ impl<const N: usize> Learner<N> {
             last_cycle: None,
             since_freeze_s: 0.0,
             since_slow_s: [0.0; N],
-            last_velocity_rad_per_s: Vector::zeros(),
+            last_velocity_rad_per_s: [0.0; N],
             speed_gate: config.friction.map(|friction| SpeedGate::of(&friction)),
-            cycles_to_sample: 0,
+            sums: vec![Some(Row::ZERO); N],
+            summed: 0,
+            cycles_per_sample: ((SAMPLE_S / config.period_s) as u32).max(1),
             interval_s: 0.0,
             collecting: vec![Information::empty(); N],
             waiting: VecDeque::new(),
@@ -178,17 +185,17 @@ impl<const N: usize> Learner<N> {
         }
         let rows = self.rows.cycle(record);
         self.since_freeze_s += self.period_s;
-        let velocity = &record.velocity_rad_per_s;
         for (i, since) in self.since_slow_s.iter_mut().enumerate() {
-            let is_fast = velocity[i].abs() >= self.speed_gate[i].min_rad_per_s;
-            let reverses = velocity[i] * self.last_velocity_rad_per_s[i] < 0.0;
+            let velocity = rows[i].columns[VISCOUS];
+            let is_fast = velocity.abs() >= self.speed_gate[i].min_rad_per_s;
+            let reverses = velocity * self.last_velocity_rad_per_s[i] < 0.0;
+            self.last_velocity_rad_per_s[i] = velocity;
             if is_fast && !reverses {
                 *since += self.period_s;
             } else {
                 *since = 0.0;
             }
         }
-        self.last_velocity_rad_per_s = *velocity;
         match Frozen::of_cycle(record) {
             Some(frozen) => {
                 self.frozen = Some(frozen);
@@ -213,27 +220,40 @@ impl<const N: usize> Learner<N> {
         self.requests(cycle)
     }
 
-    /// Samples of the joints that move.
-    fn collect(&mut self, rows: &[crate::rows::Row]) {
-        if self.cycles_to_sample > 0 {
-            self.cycles_to_sample -= 1;
-            return;
-        }
-        let cycles = (SAMPLE_S / self.period_s) as u32;
-        self.cycles_to_sample = cycles.saturating_sub(1);
-        let sample_s = f64::from(cycles.max(1)) * self.period_s;
-        for (i, row) in rows.iter().enumerate() {
-            if self.since_slow_s[i] >= self.speed_gate[i].settle_s {
-                let weight = sample_s / CORRELATION_S / self.prior.noise_nm[i].powi(2);
-                self.collecting[i].add(row, weight);
+    /// Samples of the joints that move: mean equations of the cycles since the last sample.
+    fn collect(&mut self, rows: &[Row]) {
+        for (i, (sum, row)) in self.sums.iter_mut().zip(rows).enumerate() {
+            if self.since_slow_s[i] < self.speed_gate[i].settle_s {
+                *sum = None;
+            } else if let Some(sum) = sum {
+                sum.add(row);
             }
         }
+        self.summed += 1;
+        if self.summed < self.cycles_per_sample {
+            return;
+        }
+        let cycles = f64::from(self.summed);
+        for (i, sum) in self.sums.iter_mut().enumerate() {
+            if let Some(sum) = sum {
+                let weight =
+                    cycles * self.period_s / CORRELATION_S / self.prior.noise_nm[i].powi(2);
+                self.collecting[i].add(&sum.scaled(1.0 / cycles), weight);
+            }
+        }
+        self.begin_sample();
+    }
+
+    fn begin_sample(&mut self) {
+        self.sums = vec![Some(Row::ZERO); N];
+        self.summed = 0;
     }
 
     /// Discards all samples that have not been used.
     fn discard(&mut self) {
         self.waiting.clear();
         self.collecting = vec![Information::empty(); N];
+        self.begin_sample();
         self.interval_s = 0.0;
     }
 

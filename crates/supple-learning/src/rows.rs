@@ -23,7 +23,7 @@ use supple_core::dynamics::{Terms, terms};
 use supple_core::learned::MapWeights;
 use supple_core::learned_torque::{payload_torque_nm, tilt_torque_nm};
 use supple_core::math::{Vector3, exp};
-use supple_core::{Config, Vector};
+use supple_core::{Config, Friction, Vector};
 
 /// Bandwidth of the filter `F` \[rad/s\].
 pub const FILTER_RAD_PER_S: f64 = 40.0;
@@ -37,6 +37,27 @@ pub struct Row {
     pub columns: [f64; ALL],
     /// Commanded torque beyond the model's \[N m\].
     pub error_nm: f64,
+}
+
+impl Row {
+    pub(crate) const ZERO: Row = Row {
+        columns: [0.0; ALL],
+        error_nm: 0.0,
+    };
+
+    pub(crate) fn add(&mut self, other: &Row) {
+        for (column, other) in self.columns.iter_mut().zip(&other.columns) {
+            *column += other;
+        }
+        self.error_nm += other.error_nm;
+    }
+
+    pub(crate) fn scaled(&self, factor: f64) -> Row {
+        Row {
+            columns: self.columns.map(|column| column * factor),
+            error_nm: self.error_nm * factor,
+        }
+    }
 }
 
 /// Filters of an arm.
@@ -114,6 +135,8 @@ impl<const N: usize> Rows<N> {
         }
         let (q, config) = (self.position[1], &self.config);
         terms(&config.arm, &q, velocity, &mut self.terms);
+        let loaded: [Friction; N] =
+            core::array::from_fn(|i| config.friction[i].at_load(self.terms.gravity[i]));
         let direction = Vector::<N>::from_fn(|i, _| {
             let friction = &config.friction[i];
             if friction.presliding_rad == 0.0 || first {
@@ -124,7 +147,7 @@ impl<const N: usize> Rows<N> {
         });
         self.direction = direction;
         let friction = Vector::<N>::from_fn(|i, _| {
-            config.friction[i].torque_in_direction_nm(velocity[i], direction[i], 1.0)
+            loaded[i].torque_in_direction_nm(velocity[i], direction[i], 1.0)
         });
         let model = self.terms.gravity + friction - self.terms.kinetic_gradient;
         let tip_velocity = self.terms.jacobian.fixed_rows::<3>(0) * velocity;

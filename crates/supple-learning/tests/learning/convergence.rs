@@ -65,6 +65,25 @@ fn learns<const N: usize>(config: Config<N>, truth: Truth<N>) -> Result<(), Test
     Ok(())
 }
 
+/// Steps of the encoders that a fast estimator turns into noise of the velocity teach nothing: with an exact model all terms stay
+/// near zero.
+#[test]
+fn noise_of_the_velocity_teaches_nothing() {
+    let mut config = model(four());
+    config.estimator_rad_per_s = 400.0;
+    let mut world = World::new(config, Truth::none());
+    world.encoder_step_rad = 4e-4;
+    world.request(Request::Excite(exciting::<4>(12.0)));
+    let mut greatest = 0.0_f64;
+    for _ in 0..11_000 {
+        let output = world.cycle(None, Vector3::zeros());
+        assert_eq!(output.fault, None);
+        greatest = greatest.max(output.torques.learned.amax());
+    }
+    assert!(world.requests.len() > 10, "{}", world.requests.len());
+    assert!(greatest < 0.02, "{greatest} N m");
+}
+
 fn check<const N: usize>(cases: u32, config: Config<N>) {
     let settings = crate::support::settings::config(cases, 20_261_123);
     crate::support::property::run(settings, truth::<N>(), |truth| learns(config, truth));

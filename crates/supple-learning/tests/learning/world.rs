@@ -116,6 +116,8 @@ pub struct World<const N: usize> {
     direction: Vector<N>,
     scheduled: VecDeque<Scheduled<N>>,
     steps: u64,
+    /// Size of the steps of the encoders; zero: none \[rad\].
+    pub encoder_step_rad: f64,
     /// Every request of the learner.
     pub requests: Vec<Scheduled<N>>,
 }
@@ -132,6 +134,7 @@ impl<const N: usize> World<N> {
             truth,
             scheduled: VecDeque::new(),
             steps: 0,
+            encoder_step_rad: 0.0,
             requests: Vec::new(),
         };
         world.cycle(None, Vector3::zeros());
@@ -160,7 +163,10 @@ impl<const N: usize> World<N> {
             None if due => self.scheduled.pop_front().map(|s| s.request),
             request => request,
         };
-        self.rig.q = self.plant.q;
+        self.rig.q = match self.encoder_step_rad {
+            0.0 => self.plant.q,
+            step_rad => self.plant.q.map(|q| (q / step_rad).round() * step_rad),
+        };
         let input = supple_core::Input {
             request,
             ..self.rig.input()
