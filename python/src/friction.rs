@@ -4,7 +4,7 @@ use crate::arrays;
 use numpy::PyUntypedArrayMethods;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use supple_core::friction;
+use supple_core::friction::{self, LoadTorque};
 
 /// Friction of one joint: viscous and Coulomb, continuous over a band, with Stribeck effect and offset.
 ///
@@ -28,6 +28,12 @@ use supple_core::friction;
 /// presliding_rad : float
 ///     Travel over which dry friction turns round after a reversal (rad), zero or more. Default 0: its direction is
 ///     that of the velocity.
+/// load_coefficient : float
+///     Dry friction that a torque on the gear adds, per torque, 0 to 0.5. Default 0: friction does not depend on the load.
+/// load_torque : {"joint", "motor"}
+///     Which torque that is: that which the joint carries, or that of the motor, which has to overcome friction as well.
+/// coulomb_at_nm : float
+///     Size of that torque at which dry friction is ``coulomb_nm`` (N m), zero or more. Default 0.
 ///
 /// Raises
 /// ------
@@ -46,6 +52,9 @@ pub struct Friction {
     pub inner: friction::Friction,
 }
 
+/// What a pickle calls, with its arguments.
+type Pickle<'py> = (Bound<'py, PyAny>, ([f64; 9], &'static str));
+
 #[pymethods]
 impl Friction {
     #[new]
@@ -58,9 +67,14 @@ impl Friction {
         offset_nm = 0.0,
         band_rad_per_s = friction::Friction::NONE.band_rad_per_s,
         presliding_rad = 0.0,
+        load_coefficient = 0.0,
+        load_torque = "joint",
+        coulomb_at_nm = 0.0,
     ), text_signature = "(*, viscous_nm_s_per_rad=0.0, coulomb_nm=0.0, breakaway_nm=None, \
         stribeck_rad_per_s=0.05, offset_nm=0.0, band_rad_per_s=0.01, \
-        presliding_rad=0.0)")]
+        presliding_rad=0.0, load_coefficient=0.0, load_torque='joint', \
+        coulomb_at_nm=0.0)")]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn new(
         viscous_nm_s_per_rad: f64,
         coulomb_nm: f64,
@@ -69,7 +83,19 @@ impl Friction {
         offset_nm: f64,
         band_rad_per_s: f64,
         presliding_rad: f64,
+        load_coefficient: f64,
+        load_torque: &str,
+        coulomb_at_nm: f64,
     ) -> PyResult<Self> {
+        let load_torque = match load_torque {
+            "joint" => LoadTorque::Joint,
+            "motor" => LoadTorque::Motor,
+            other => {
+                return Err(PyValueError::new_err(format!(
+                    "load_torque: expected \"joint\" or \"motor\", got {other:?}"
+                )));
+            }
+        };
         let inner = friction::Friction {
             viscous_nm_s_per_rad,
             coulomb_nm,
@@ -78,6 +104,9 @@ impl Friction {
             offset_nm,
             band_rad_per_s,
             presliding_rad,
+            load_coefficient,
+            load_torque,
+            coulomb_at_nm,
         };
         inner
             .validate()
@@ -115,6 +144,27 @@ impl Friction {
         self.inner.presliding_rad
     }
 
+    /// Dry friction that a torque on the gear adds, per torque.
+    #[getter]
+    fn load_coefficient(&self) -> f64 {
+        self.inner.load_coefficient
+    }
+
+    /// Which torque that is, "joint" or "motor".
+    #[getter]
+    fn load_torque(&self) -> &'static str {
+        match self.inner.load_torque {
+            LoadTorque::Joint => "joint",
+            LoadTorque::Motor => "motor",
+        }
+    }
+
+    /// Size of that torque at which dry friction is ``coulomb_nm`` (N m).
+    #[getter]
+    fn coulomb_at_nm(&self) -> f64 {
+        self.inner.coulomb_at_nm
+    }
+
     /// Torque that does not depend on the velocity (N m).
     #[getter]
     fn offset_nm(&self) -> f64 {
@@ -144,9 +194,10 @@ impl Friction {
         arrays::array(py, torques, velocity.shape())
     }
 
-    /// Constructor for pickles: viscous, Coulomb, breakaway, Stribeck speed, offset, band.
+    /// Constructor for pickles: viscous, Coulomb, breakaway, Stribeck speed, offset, band, presliding, load
+    /// coefficient, load.
     #[staticmethod]
-    fn _of(values: [f64; 7]) -> PyResult<Self> {
+    fn _of(values: [f64; 9], load_torque: &str) -> PyResult<Self> {
         let [
             viscous,
             coulomb,
@@ -155,6 +206,8 @@ impl Friction {
             offset,
             band,
             presliding,
+            load_coefficient,
+            coulomb_at_nm,
         ] = values;
         Self::new(
             viscous,
@@ -164,10 +217,13 @@ impl Friction {
             offset,
             band,
             presliding,
+            load_coefficient,
+            load_torque,
+            coulomb_at_nm,
         )
     }
 
-    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, ([f64; 7],))> {
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<Pickle<'py>> {
         let f = &self.inner;
         let rebuild = py.get_type::<Self>().getattr("_of")?;
         let values = [
@@ -178,22 +234,28 @@ impl Friction {
             f.offset_nm,
             f.band_rad_per_s,
             f.presliding_rad,
+            f.load_coefficient,
+            f.coulomb_at_nm,
         ];
-        Ok((rebuild, (values,)))
+        Ok((rebuild, (values, self.load_torque())))
     }
 
     fn __repr__(&self) -> String {
         let f = &self.inner;
         format!(
             "Friction(viscous_nm_s_per_rad={}, coulomb_nm={}, breakaway_nm={}, \
-             stribeck_rad_per_s={}, offset_nm={}, band_rad_per_s={}, presliding_rad={})",
+             stribeck_rad_per_s={}, offset_nm={}, band_rad_per_s={}, presliding_rad={}, \
+             load_coefficient={}, load_torque={:?}, coulomb_at_nm={})",
             f.viscous_nm_s_per_rad,
             f.coulomb_nm,
             f.breakaway_nm,
             f.stribeck_rad_per_s,
             f.offset_nm,
             f.band_rad_per_s,
-            f.presliding_rad
+            f.presliding_rad,
+            f.load_coefficient,
+            self.load_torque(),
+            f.coulomb_at_nm
         )
     }
 }

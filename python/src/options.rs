@@ -59,7 +59,7 @@ impl Options {
             coulomb: shape.coulomb,
             offset: shape.offset,
             asymmetry: shape.asymmetry,
-            load: shape.load,
+            load: shape.load.then_some(supple_ident::LoadTorque::Joint),
             stribeck_rad_per_s: shape.stribeck_rad_per_s,
             band_rad_per_s: shape.band_rad_per_s,
         };

@@ -30,6 +30,9 @@ def test_the_law_matches_its_formula():
         {"coulomb_nm": float("nan")},
         {"coulomb_nm": 1.0, "breakaway_nm": 0.5},
         {"band_rad_per_s": 0.0},
+        {"load_coefficient": 0.6},
+        {"load_torque": "gear"},
+        {"coulomb_at_nm": -1.0},
     ],
 )
 def test_friction_that_supplies_energy_is_rejected(wrong):

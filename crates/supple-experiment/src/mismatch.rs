@@ -63,9 +63,7 @@ impl Mismatch {
             let dry_friction_factor = factor(self.friction);
             Friction {
                 viscous_nm_s_per_rad: friction.viscous_nm_s_per_rad * viscous_friction_factor,
-                coulomb_nm: friction.coulomb_nm * dry_friction_factor,
-                breakaway_nm: friction.breakaway_nm * dry_friction_factor,
-                ..friction
+                ..friction.with_dry_scaled(dry_friction_factor)
             }
         });
         Ok(Config {

@@ -7,13 +7,14 @@
 //!         + I_c (qdd_a + qdd_b) + V_c (qd_a + qd_b) + S_c p((qd_a + qd_b)/delta)
 //! ```
 //!
-//! `p` is the parabola of [`supple_core::friction`]. `g_j` is the torque that the gear of joint j transmits to
-//! the links, by the nominal model (gear friction grows with load). A coupled motor turns with the sum of two
+//! `p` is the parabola of [`supple_core::friction`]. The dry friction of a gear grows with a torque
+//! `g_j`: that which joint j carries, by the nominal model, or that of the motor. A coupled motor turns with the sum of two
 //! joints; its torque acts on both.
 
 use crate::effects::Effects;
 use crate::error::{IdentError, positive, shape_error};
 use supple_core::Friction;
+use supple_core::friction::LoadTorque;
 
 /// Names of the ten parameters of a link, in the order of [`supple_core::dynamics::parameters`].
 pub const LINK_NAMES: [&str; 10] = [
@@ -31,8 +32,8 @@ pub struct FrictionColumns {
     pub offset: bool,
     /// `A`: viscous friction that differs by direction, `|A| <= V`.
     pub asymmetry: bool,
-    /// `L`: Coulomb friction that grows with the torque transmitted to the links.
-    pub load: bool,
+    /// `L`: Coulomb friction that grows with this torque.
+    pub load: Option<LoadTorque>,
     /// `B`, with its `v_s` \[rad/s\].
     pub stribeck_rad_per_s: Option<f64>,
     /// `delta` of the parabola \[rad/s\].
@@ -46,7 +47,7 @@ impl FrictionColumns {
         coulomb: false,
         offset: false,
         asymmetry: false,
-        load: false,
+        load: None,
         stribeck_rad_per_s: None,
         band_rad_per_s: Friction::NONE.band_rad_per_s,
     };
@@ -97,6 +98,8 @@ pub enum Column {
     Spring(usize),
     /// Compliance of a joint, in 1e-3 rad/(N m).
     Compliance(usize),
+    /// `s` of a joint, its torque scale.
+    TorqueScale(usize),
     /// Dry friction of a motor that drives several joints, at the joint that it drives fastest.
     MotorCoulomb(usize),
     /// Viscous friction of such a motor.
@@ -155,7 +158,7 @@ impl Columns {
                 "viscous columns in addition to its asymmetry",
             ),
             (
-                friction.load,
+                friction.load.is_some(),
                 friction.coulomb,
                 "load alone",
                 "Coulomb columns in addition to its load",
@@ -180,7 +183,7 @@ impl Columns {
                     friction.stribeck_rad_per_s.is_some(),
                     Column::Stribeck(joint),
                 ),
-                (friction.load, Column::Load(joint)),
+                (friction.load.is_some(), Column::Load(joint)),
             ];
             columns.extend(
                 wanted
@@ -273,6 +276,7 @@ impl Columns {
             Column::CoupledCoulomb(a, b) => format!("S{a}+{b}"),
             Column::Spring(j) => format!("k{j}"),
             Column::Compliance(j) => format!("C{j}"),
+            Column::TorqueScale(j) => format!("s{j}"),
             Column::MotorCoulomb(m) => format!("S of motor {m}"),
             Column::MotorViscous(m) => format!("V of motor {m}"),
             Column::Tilt(axis) => format!("tilt{}", ["x", "y"][axis.min(1)]),
@@ -286,7 +290,10 @@ impl Columns {
         let mut forms = Vec::new();
         for (i, column) in self.columns.iter().enumerate() {
             match *column {
-                Column::Link { .. } | Column::Offset(_) | Column::Tilt(_) => {}
+                Column::Link { .. }
+                | Column::Offset(_)
+                | Column::Tilt(_)
+                | Column::TorqueScale(_) => {}
                 Column::Asymmetry(joint) => {
                     let viscous = self.position(Column::Viscous(joint)).map(|v| (v, 1.0));
                     for sign in [1.0, -1.0] {
@@ -306,6 +313,7 @@ fn of_effects(effects: &Effects, moving: &[usize]) -> Vec<Column> {
     for &joint in moving {
         columns.extend(effects.springs.then_some(Column::Spring(joint)));
         columns.extend(effects.compliance.then_some(Column::Compliance(joint)));
+        columns.extend(effects.torque_scale.then_some(Column::TorqueScale(joint)));
     }
     columns.extend(
         effects

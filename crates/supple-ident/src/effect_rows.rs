@@ -97,7 +97,7 @@ pub(crate) fn spring_map<const N: usize>(
     core::array::from_fn(|k| slope * (lower + interval * (k as f64 - 0.5)))
 }
 
-/// The learned terms of identified springs and tilt.
+/// The learned terms of identified springs, tilt and torque scales.
 pub(crate) fn learned<const N: usize>(
     columns: &Columns,
     value: &dyn Fn(Column) -> f64,
@@ -112,6 +112,11 @@ pub(crate) fn learned<const N: usize>(
             torque_nm: spring.map(|nm| nm.clamp(-bound_nm, bound_nm)),
             ..JointMap::ZERO
         };
+    }
+    for &joint in columns.moving() {
+        let bound = bounds.parameters.torque_scale[joint];
+        terms.parameters.torque_scale[joint] =
+            value(Column::TorqueScale(joint)).clamp(-bound, bound);
     }
     for axis in 0..2 {
         let bound_rad = bounds.parameters.tilt_rad[axis];

@@ -6,10 +6,12 @@
 //!      + b_m r_m^T r_m qd                           viscous friction of motor m
 //!      - C_j (dG / dq_j) G_j                        compliance C_j between the encoder of joint j and its link
 //!      + t_x dG / dt_x + t_y dG / dt_y              gravity turned by a small rotation t: the base is tilted
+//!      + s_j (Y_j p)                                a motor that gives 1 / (1 + s_j) of the torque that it is commanded
 //! ```
 //!
-//! Friction at the motors is that of the joints unless a motor drives several: only these have columns. `G` is that of the
-//! nominal arm; an error of some per cent of it is one of some per cent in the small effect.
+//! Friction at the motors is that of the joints unless a motor drives several: only these have columns. `G` and `Y p` are those
+//! of the nominal arm; an error of some per cent of them is one of some per cent in the small effect. What all motors have in
+//! common of `s` is in the links.
 
 use nalgebra::DMatrix;
 
@@ -22,6 +24,8 @@ pub struct Effects {
     pub tilt: bool,
     /// Compliance of the joints.
     pub compliance: bool,
+    /// Torque scale of each joint.
+    pub torque_scale: bool,
     /// `j2mp`, (motors, joints): friction of the motors that drive several joints.
     pub motor_from_joint: Option<DMatrix<f64>>,
 }
@@ -33,6 +37,7 @@ impl Effects {
             springs: true,
             tilt: true,
             compliance: true,
+            torque_scale: true,
             motor_from_joint: Some(motor_from_joint),
         }
     }

@@ -1,6 +1,6 @@
 //! Torques of a controller's feed-forward in a motion: links and friction, compliance and learned terms.
 //!
-//! Not those of a fit, which has terms that a controller takes at their mean, such as friction that grows with the load.
+//! Not those of a fit, which has terms that a controller leaves out, such as viscous friction that differs by direction.
 
 use crate::motion::Motion;
 use nalgebra::DMatrix;
@@ -32,9 +32,13 @@ fn each_sample<const N: usize>(
     for sample in 0..motion.samples() {
         let at = |m: &DMatrix<f64>| Vector::<N>::from_fn(|j, _| m[(sample, j)]);
         let (encoder, qd, qdd) = (at(&motion.q), at(&motion.qd), at(&motion.qdd));
-        let friction = Vector::from_fn(|j, _| config.friction[j].torque_nm(qd[j]));
-        let inverse_dynamics =
-            |terms: &Terms<N>| terms.mass_matrix * qdd + terms.coriolis_gravity + friction;
+        let inverse_dynamics = |terms: &Terms<N>| {
+            let friction = |j: usize, _| {
+                let loaded = config.friction[j].at_load(terms.gravity[j]);
+                loaded.torque_nm(qd[j])
+            };
+            terms.mass_matrix * qdd + terms.coriolis_gravity + Vector::from_fn(friction)
+        };
         terms(&config.arm, &encoder, &qd, &mut at_pose);
         let plain = inverse_dynamics(&at_pose);
         let q = encoder - config.compliance_rad_per_nm.component_mul(&at_pose.gravity);

@@ -13,9 +13,10 @@ use crate::motion::{Motion, Preparation};
 pub use crate::options::{Options, Weights};
 use crate::qr_reduction::ReducedSystem;
 use crate::random::Random;
-use crate::regressor::{joint_rows, rows};
+use crate::regressor::{joint_rows, rows_under_load};
 use nalgebra::{DMatrix, DVector};
 use supple_core::dynamics::{regressor, regressor_times};
+use supple_core::friction::LoadTorque;
 use supple_core::learned::LearnedTerms;
 use supple_core::{Arm, Config, Friction, Vector};
 
@@ -28,6 +29,8 @@ const MIN_ROWS: usize = 20;
 
 /// Maximum number of reweighting iterations.
 const ROUNDS: usize = 5;
+/// Passes in which a prediction finds the torque of a motor whose friction depends on it.
+const LOAD_PASSES: usize = 4;
 
 /// Samples that the prior of an effect counts for, as a root: errors of the model are correlated over many samples.
 const EFFECT_PRIOR_WEIGHT: f64 = 50.0;
@@ -181,6 +184,7 @@ fn effect_prior(column: &Column) -> Option<(f64, f64)> {
         Column::Compliance(_) => Some((0.33, 0.33)),
         Column::MotorCoulomb(_) | Column::MotorViscous(_) => Some((0.0, 0.5)),
         Column::Tilt(_) => Some((0.0, 0.005)),
+        Column::TorqueScale(_) => Some((0.0, 0.03)),
         _ => None,
     }
 }
@@ -383,7 +387,7 @@ impl<const N: usize> Fit<N> {
         model::arm(&self.nominal, &self.columns, &self.x)
     }
 
-    /// Friction of every joint of the arm, in the controller's law; load-dependent friction is taken at
+    /// Friction of every joint of the arm, in the controller's law; load-dependent friction is given at
     /// [`Fit::load_nm`].
     pub fn friction(&self) -> Vec<Friction> {
         self.friction_of(&self.x)
@@ -397,6 +401,11 @@ impl<const N: usize> Fit<N> {
     /// Compliance between encoder and link of each joint \[rad/(N m)\]; zero where it is not identified.
     pub fn compliance_rad_per_nm(&self) -> [f64; N] {
         core::array::from_fn(|j| effect_rows::COMPLIANCE_UNIT * self.value(Column::Compliance(j)))
+    }
+
+    /// Torque scale of each joint beyond that of all; zero where it is not identified.
+    pub fn torque_scale(&self) -> [f64; N] {
+        core::array::from_fn(|j| self.value(Column::TorqueScale(j)))
     }
 
     pub(crate) fn value(&self, column: Column) -> f64 {
@@ -436,13 +445,22 @@ impl<const N: usize> Fit<N> {
         let link_regressor = regressor(&self.nominal, q, &moving_only(qd), &moving_only(qdd));
         let links = model::link_parameters::<N>(&self.x);
         let mut torque = regressor_times(&link_regressor, &links);
-        let explained = rows(&self.nominal, &self.columns, q, qd, qdd) * &self.x;
-        for (row, &joint) in moving.iter().enumerate() {
-            let rotor = match self.columns.position(Column::Rotor(joint)) {
-                Some(_) => 0.0,
-                None => self.nominal.armature()[joint] * qdd[joint],
-            };
-            torque[joint] = explained[row] + rotor;
+        let passes = if self.columns.friction().load == Some(LoadTorque::Motor) {
+            LOAD_PASSES
+        } else {
+            1
+        };
+        for pass in 0..passes {
+            let load = (pass > 0).then_some(&torque);
+            let rows = rows_under_load(&self.nominal, &self.columns, [q, qd, qdd], load);
+            let explained = rows * &self.x;
+            for (row, &joint) in moving.iter().enumerate() {
+                let rotor = match self.columns.position(Column::Rotor(joint)) {
+                    Some(_) => 0.0,
+                    None => self.nominal.armature()[joint] * qdd[joint],
+                };
+                torque[joint] = explained[row] + rotor;
+            }
         }
         torque
     }

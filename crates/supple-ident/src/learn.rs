@@ -11,7 +11,7 @@ use crate::filter::LowPass;
 use crate::motion::Motion;
 use crate::save::SaveError;
 use nalgebra::{DMatrix, DVector, Vector4};
-use supple_core::dynamics::{regressor, rnea};
+use supple_core::dynamics::{gravity, regressor, rnea};
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, Config, Friction, Vector};
 use supple_model::{Description, IdentifiedModel};
@@ -140,9 +140,7 @@ pub fn learn<const N: usize>(
         let scale = |relative_change: f64| (1.0 + relative_change).max(0.0);
         learned.friction[joint] = Friction {
             viscous_nm_s_per_rad: old.viscous_nm_s_per_rad * scale(change[2 * index]),
-            coulomb_nm: old.coulomb_nm * scale(change[2 * index + 1]),
-            breakaway_nm: old.breakaway_nm * scale(change[2 * index + 1]),
-            ..old
+            ..old.with_dry_scaled(scale(change[2 * index + 1]))
         };
     }
     let mut counts = [0_u32; N];
@@ -188,11 +186,15 @@ fn rows<const N: usize>(
         .transpose()?;
     // Dry friction changes sign faster than the filter can follow, so its columns are filtered like the
     // torques.
+    let load_nm: Vec<Vector<N>> = (0..samples)
+        .map(|i| gravity(arm, &Vector::from_fn(|j, _| motion.q[(i, j)])))
+        .collect();
     let dry: Vec<Vec<f64>> = moving
         .iter()
         .map(|&j| {
+            let at_load = |i: usize| friction[j].at_load(load_nm[i][j]);
             let raw: Vec<f64> = (0..samples)
-                .map(|i| friction[j].dry_torque_nm(motion.qd[(i, j)]))
+                .map(|i| at_load(i).dry_torque_nm(motion.qd[(i, j)]))
                 .collect();
             low_pass.map_or(Ok(raw.clone()), |filter| filter.zero_phase(&raw))
         })

@@ -73,4 +73,5 @@ pub use ripple::{RippleSearch, fit_ripple};
 pub use save::SaveError;
 pub use series::SeriesLists;
 pub use stribeck::fit_with_stribeck;
+pub use supple_core::friction::LoadTorque;
 pub use validate::{Validation, verdict};

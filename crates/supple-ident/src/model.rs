@@ -5,6 +5,7 @@ use crate::error::IdentError;
 use nalgebra::{DMatrix, DVector, SVector};
 use supple_core::arm::Link;
 use supple_core::dynamics::{parameters, regressor, regressor_times};
+use supple_core::friction::MAX_LOAD_COEFFICIENT;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, Friction, Vector};
 
@@ -52,17 +53,19 @@ pub fn arm<const N: usize>(
 }
 
 /// Friction of each joint of the arm, in the controller's law. Effects that this law does not model (asymmetry,
-/// couplings) stay in the columns; load-dependent friction is taken at `load_nm` of each moving joint. Held
+/// couplings) stay in the columns; load-dependent friction is given at `load_nm` of each moving joint. Held
 /// joints have no friction.
 pub fn friction(columns: &Columns, x: &DVector<f64>, load_nm: &[f64]) -> Vec<Friction> {
     let value = |column: Column| columns.position(column).map_or(0.0, |i| x[i]);
-    let load = |j: usize| {
-        let row = columns.moving().binary_search(&j);
-        row.map_or(0.0, |row| load_nm[row] * value(Column::Load(j)))
-    };
     let of_joint = |j: usize| {
         let (motor_coulomb_nm, motor_viscous) = motor_friction(columns, x, j);
-        let coulomb_nm = value(Column::Coulomb(j)) + load(j) + motor_coulomb_nm;
+        let load_coefficient = value(Column::Load(j)).min(MAX_LOAD_COEFFICIENT);
+        let coulomb_at_nm = match columns.moving().binary_search(&j) {
+            Ok(row) if load_coefficient > 0.0 => load_nm[row],
+            _ => 0.0,
+        };
+        let coulomb_nm =
+            value(Column::Coulomb(j)) + load_coefficient * coulomb_at_nm + motor_coulomb_nm;
         let shape = columns.friction();
         Friction {
             viscous_nm_s_per_rad: value(Column::Viscous(j)) + motor_viscous,
@@ -74,6 +77,9 @@ pub fn friction(columns: &Columns, x: &DVector<f64>, load_nm: &[f64]) -> Vec<Fri
             offset_nm: value(Column::Offset(j)),
             band_rad_per_s: shape.band_rad_per_s,
             presliding_rad: 0.0,
+            load_coefficient,
+            load_torque: shape.load.unwrap_or_default(),
+            coulomb_at_nm,
         }
     };
     (0..columns.dof()).map(of_joint).collect()

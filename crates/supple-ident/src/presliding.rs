@@ -66,11 +66,13 @@ pub fn presliding_rad<const N: usize>(
             continue;
         }
         let errors = |travel_rad: f64| -> Result<[f64; 2], IdentError> {
-            // That of the motors is in the rest of the model.
+            // Those of the motors and of the load are in the rest of the model.
             let law = Friction {
                 coulomb_nm,
                 breakaway_nm: coulomb_nm + dip_nm,
                 presliding_rad: travel_rad,
+                load_coefficient: 0.0,
+                coulomb_at_nm: 0.0,
                 ..friction[joint]
             };
             let dry = motions.iter().map(|motion| dry_nm(&law, motion, joint));

@@ -8,17 +8,28 @@ pub use crate::joint_rows::JointRows;
 use crate::motion::Motion;
 use nalgebra::DMatrix;
 use supple_core::dynamics::{parameters, regressor, regressor_times};
+use supple_core::friction::LoadTorque;
 use supple_core::math::exp;
 use supple_core::{Arm, Friction, Vector};
 
 /// Regressor of one state, (moving joints, columns). Held joints are taken at rest, whatever `qd` and `qdd`
-/// contain.
+/// contain. The motors are taken to transmit what the links of `arm` need.
 pub fn rows<const N: usize>(
     arm: &Arm<N>,
     columns: &Columns,
     q: &Vector<N>,
     qd: &Vector<N>,
     qdd: &Vector<N>,
+) -> DMatrix<f64> {
+    rows_under_load(arm, columns, [q, qd, qdd], None)
+}
+
+/// [`rows`] at `[q, qd, qdd]` while the motors transmit `motor_nm`.
+pub(crate) fn rows_under_load<const N: usize>(
+    arm: &Arm<N>,
+    columns: &Columns,
+    [q, qd, qdd]: [&Vector<N>; 3],
+    motor_nm: Option<&Vector<N>>,
 ) -> DMatrix<f64> {
     let moving_only = |v: &Vector<N>| {
         Vector::<N>::from_fn(|j, _| {
@@ -32,9 +43,12 @@ pub fn rows<const N: usize>(
     let (qd, qdd) = (moving_only(qd), moving_only(qdd));
     let link_regressor = regressor(arm, q, &qd, &qdd);
     let friction = columns.friction();
-    let load = friction
-        .load
-        .then(|| regressor_times(&link_regressor, &parameters(arm)));
+    let uses_links = columns.effects().torque_scale || friction.load.is_some();
+    let links = uses_links.then(|| regressor_times(&link_regressor, &parameters(arm)));
+    let load = match (friction.load, motor_nm) {
+        (Some(LoadTorque::Motor), Some(motor_nm)) => Some(*motor_nm),
+        _ => links,
+    };
     let dry = Friction {
         band_rad_per_s: friction.band_rad_per_s,
         ..Friction::coulomb(0.0, 1.0)
@@ -58,6 +72,10 @@ pub fn rows<const N: usize>(
             Column::Viscous(j) => put(j, qd[j]),
             Column::Coulomb(j) => put(j, dry.dry_torque_nm(qd[j])),
             Column::Offset(j) => put(j, 1.0),
+            Column::TorqueScale(j) => put(
+                j,
+                links.map_or(0.0, |links| links[j]) + arm.armature()[j] * qdd[j],
+            ),
             Column::Asymmetry(j) => put(j, qd[j].abs()),
             Column::Stribeck(j) => {
                 let s = qd[j] / friction.stribeck_rad_per_s.unwrap_or(f64::INFINITY);
@@ -143,13 +161,8 @@ pub fn joint_rows<const N: usize>(
         .collect();
     for i in 0..samples {
         let at = |m: &DMatrix<f64>| Vector::<N>::from_fn(|j, _| m[(i, j)]);
-        let state = rows(
-            arm,
-            columns,
-            &at(&motion.q),
-            &at(&motion.qd),
-            &at(&motion.qdd),
-        );
+        let state = [&at(&motion.q), &at(&motion.qd), &at(&motion.qdd)];
+        let state = rows_under_load(arm, columns, state, Some(&at(&motion.tau)));
         for (row, joint) in joints.iter_mut().enumerate() {
             joint.a.row_mut(i).copy_from(&state.row(row));
         }

@@ -28,7 +28,7 @@ pub enum SaveError {
 
 impl<const N: usize> Fit<N> {
     /// `of` with the identified model: inertias of all links, rotors and friction of the moving joints, and, if they were
-    /// identified, springs and tilt as `[learned]` and the compliance of the joints. The fit explains the whole torque of the
+    /// identified, springs, tilt and torque scales as `[learned]` and the compliance of the joints. The fit explains the whole torque of the
     /// joints that moved: they keep no learned terms and no compliance of `of`, and its payload and tilt, which act on
     /// several joints, are removed; terms of the other joints stay. All other text is unchanged. `ripple`, if given, replaces
     /// the motors' tables.
@@ -42,13 +42,19 @@ impl<const N: usize> Fit<N> {
     ) -> Result<Description, SaveError> {
         let error = 100.0 * self.training_relative;
         let source = format!("identified from logs; {error:.2} % of the torque left unexplained");
+        let (effects, given) = (self.columns.effects(), of.config::<N>()?);
+        // The controller scales friction with the rest of its model.
+        let mut friction = self.friction_with(of.friction());
+        let scale = self.learned(&given).parameters.torque_scale;
+        for (friction, scale) in friction.iter_mut().zip(&scale) {
+            *friction = friction.scaled(1.0 / (1.0 + scale));
+        }
         let described = of.with_model(&IdentifiedModel {
             arm: &self.arm()?,
-            friction: &self.friction_with(of.friction()),
+            friction: &friction,
             ripple,
             source: &source,
         })?;
-        let (effects, given) = (self.columns.effects(), of.config::<N>()?);
         let moves = |joint: usize| self.columns.moving().contains(&joint);
         let found = self.compliance_rad_per_nm();
         let compliance = core::array::from_fn::<f64, N, _>(|joint| match moves(joint) {
@@ -59,7 +65,8 @@ impl<const N: usize> Fit<N> {
             true => described,
             false => described.with_compliance(&compliance)?,
         };
-        if of.settings().learned.is_none() && !effects.springs && !effects.tilt {
+        let learns = effects.springs || effects.tilt || effects.torque_scale;
+        if of.settings().learned.is_none() && !learns {
             return Ok(described);
         }
         let mut learned = self.learned(&described.config::<N>()?);
@@ -77,19 +84,29 @@ impl<const N: usize> Fit<N> {
         Ok(described.with_learned(&learned, "identified with the model")?)
     }
 
-    /// Collision thresholds for the modes with stiff joint loops, from the residual of the model on held-out motions
-    /// \[N m\]: three times the greatest residual of the joint, and twice its breakaway torque. At most the joint's present
-    /// threshold; `None` for a joint that did not move.
+    /// Collision thresholds for the modes with stiff joint loops: those of [`Fit::collision_nm`], at most the joint's present
+    /// threshold \[N m\].
     pub fn move_collision_nm(&self, held_out: &[Validation], of: &Config<N>) -> [Option<f64>; N] {
+        let mut thresholds = self.collision_nm(held_out, of);
+        for (joint, threshold_nm) in thresholds.iter_mut().enumerate() {
+            let present_nm = of.collision.move_joint_torque_nm[joint];
+            *threshold_nm = threshold_nm.map(|nm| nm.min(present_nm));
+        }
+        thresholds
+    }
+
+    /// The least collision thresholds that the model itself does not exceed, from its residual on held-out motions \[N m\]:
+    /// three times the greatest residual of the joint, and twice its breakaway torque at half of its torque limit. `None` for a
+    /// joint that did not move.
+    pub fn collision_nm(&self, held_out: &[Validation], of: &Config<N>) -> [Option<f64>; N] {
         let friction = self.friction_with(&of.friction);
         let mut thresholds = [None; N];
         for (row, joint) in self.columns.moving().iter().enumerate() {
             let peaks = held_out.iter().map(|log| log.peak_nm[row]);
             let peak_nm = peaks.fold(0.0, f64::max);
-            let threshold_nm =
-                RESIDUAL_MARGIN * peak_nm + REVERSAL_MARGIN * friction[*joint].breakaway_nm;
-            let present_nm = of.collision.move_joint_torque_nm[*joint];
-            thresholds[*joint] = Some(threshold_nm.min(present_nm));
+            let loaded = friction[*joint].at_load(0.5 * of.limits.joint_torque_nm[*joint]);
+            thresholds[*joint] =
+                Some(RESIDUAL_MARGIN * peak_nm + REVERSAL_MARGIN * loaded.breakaway_nm);
         }
         thresholds
     }

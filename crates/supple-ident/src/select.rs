@@ -13,6 +13,7 @@ use crate::motion::Motion;
 use crate::options::{Options, Weights};
 use crate::regressor::joint_rows;
 use supple_core::Arm;
+use supple_core::friction::LoadTorque;
 
 /// Relative tolerance within which candidates count as equally good.
 const TIE: f64 = 0.005;
@@ -57,12 +58,12 @@ pub fn friction_candidates(base: &Options) -> Vec<Candidate> {
     shapes.into_iter().map(candidate).collect()
 }
 
-/// Coulomb friction independent of load and load-dependent; empty without Coulomb friction.
+/// Coulomb friction independent of load, and growing with either torque on the gear; empty without Coulomb friction.
 pub fn load_candidates(base: &Options) -> Vec<Candidate> {
     if !base.friction.coulomb {
         return Vec::new();
     }
-    let candidate = |(name, load): (&str, bool)| Candidate {
+    let candidate = |(name, load): (&str, Option<LoadTorque>)| Candidate {
         name: name.to_owned(),
         options: Options {
             friction: FrictionColumns {
@@ -72,9 +73,16 @@ pub fn load_candidates(base: &Options) -> Vec<Candidate> {
             ..base.clone()
         },
     };
-    [("independent of load", false), ("growing with load", true)]
-        .map(candidate)
-        .to_vec()
+    [
+        ("independent of load", None),
+        (
+            "growing with the load of the joint",
+            Some(LoadTorque::Joint),
+        ),
+        ("growing with the motor's torque", Some(LoadTorque::Motor)),
+    ]
+    .map(candidate)
+    .to_vec()
 }
 
 /// Widths of the band around standstill, with all other options as in `base`.

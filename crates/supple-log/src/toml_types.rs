@@ -6,6 +6,7 @@ use supple_core::config::{
     ApparentInertia, Border, Collision, ContactLatch, FrictionVelocity, Gains, JointGains, Law,
     Limits, PlausibilityLimits, PoseLaw, Role, RotationalGains, Workspace, Zone,
 };
+use supple_core::friction::LoadTorque;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::ripple::Harmonic;
 use supple_core::workspace::MAX_BORDERS_OR_ZONES;
@@ -45,6 +46,19 @@ pub(crate) struct FrictionDef {
     band_rad_per_s: f64,
     #[serde(default)]
     presliding_rad: f64,
+    #[serde(default)]
+    load_coefficient: f64,
+    #[serde(default, with = "LoadTorqueDef")]
+    load_torque: LoadTorque,
+    #[serde(default)]
+    coulomb_at_nm: f64,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "LoadTorque", rename_all = "snake_case")]
+enum LoadTorqueDef {
+    Joint,
+    Motor,
 }
 
 /// One line of the ripple tables, which are stored as one list.

@@ -10,6 +10,7 @@ use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
 use std::path::Path;
 use supple_core::config::{JointGains, RippleTable};
+use supple_core::friction::LoadTorque;
 use supple_core::{Arm, Body, Friction, Pose};
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, value};
 
@@ -393,6 +394,13 @@ fn friction(f: &Friction) -> InlineTable {
     table.insert("band_rad_per_s", f.band_rad_per_s.into());
     if f.presliding_rad > 0.0 {
         table.insert("presliding_rad", f.presliding_rad.into());
+    }
+    if f.load_coefficient > 0.0 {
+        table.insert("load_coefficient", f.load_coefficient.into());
+        if f.load_torque == LoadTorque::Motor {
+            table.insert("load_torque", "motor".into());
+        }
+        table.insert("coulomb_at_nm", f.coulomb_at_nm.into());
     }
     table
 }

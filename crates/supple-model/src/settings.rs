@@ -226,6 +226,27 @@ pub struct FrictionSettings {
     /// the velocity.
     #[serde(default)]
     pub presliding_rad: f64,
+    /// Dry friction that a torque on the gear adds, per torque, 0 to 0.5. Default 0: friction does not depend on the load.
+    #[serde(default)]
+    pub load_coefficient: f64,
+    /// Which torque that is. Default: that which the joint carries.
+    #[serde(default)]
+    pub load_torque: LoadTorque,
+    /// Size of that torque at which dry friction is `coulomb_nm` (N m), zero or more; `load_coefficient` times it is at most
+    /// `coulomb_nm`. Default 0.
+    #[serde(default)]
+    pub coulomb_at_nm: f64,
+}
+
+/// The torque in proportion to which a gear adds dry friction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LoadTorque {
+    /// That which the joint carries.
+    #[default]
+    Joint,
+    /// That of the motor, which has to overcome friction as well.
+    Motor,
 }
 
 /// Motors and transmission. As many motors as moving joints.
@@ -667,6 +688,12 @@ impl From<FrictionSettings> for supple_core::Friction {
             offset_nm: f.offset_nm,
             band_rad_per_s: f.band_rad_per_s,
             presliding_rad: f.presliding_rad,
+            load_coefficient: f.load_coefficient,
+            load_torque: match f.load_torque {
+                LoadTorque::Joint => supple_core::friction::LoadTorque::Joint,
+                LoadTorque::Motor => supple_core::friction::LoadTorque::Motor,
+            },
+            coulomb_at_nm: f.coulomb_at_nm,
         }
     }
 }

@@ -624,6 +624,12 @@ class Friction:
     presliding_rad : float
         Travel over which dry friction turns round after a reversal (rad), zero or more. Default 0: its direction is
         that of the velocity.
+    load_coefficient : float
+        Dry friction that a torque on the gear adds, per torque, 0 to 0.5. Default 0: friction does not depend on the load.
+    load_torque : {"joint", "motor"}
+        Which torque that is: that which the joint carries, or that of the motor, which has to overcome friction as well.
+    coulomb_at_nm : float
+        Size of that torque at which dry friction is ``coulomb_nm`` (N m), zero or more. Default 0.
 
     Raises
     ------
@@ -647,6 +653,9 @@ class Friction:
         offset_nm: float = 0.0,
         band_rad_per_s: float = 0.01,
         presliding_rad: float = 0.0,
+        load_coefficient: float = 0.0,
+        load_torque: Literal["joint", "motor"] = "joint",
+        coulomb_at_nm: float = 0.0,
     ) -> Friction: ...
     @property
     def viscous_nm_s_per_rad(self) -> float:
@@ -676,6 +685,17 @@ class Friction:
     def presliding_rad(self) -> float:
         """Travel over which dry friction turns round after a reversal (rad)."""
 
+    @property
+    def load_coefficient(self) -> float:
+        """Dry friction that a torque on the gear adds, per torque."""
+
+    @property
+    def load_torque(self) -> Literal["joint", "motor"]:
+        """Which torque that is, "joint" or "motor"."""
+
+    @property
+    def coulomb_at_nm(self) -> float:
+        """Size of that torque at which dry friction is ``coulomb_nm`` (N m)."""
 
     def torque_nm(self, velocity_rad_per_s: ArrayLike) -> _Array:
         """Torque that compensates friction (N m), of the shape of ``velocity_rad_per_s``.
@@ -687,7 +707,7 @@ class Friction:
         """
 
     @staticmethod
-    def _of(values: tuple[float, ...]) -> Friction: ...
+    def _of(values: tuple[float, ...], load_torque: str) -> Friction: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
     def __reduce__(self) -> tuple[Any, tuple[list[float]]]: ...

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use supple_experiment::procedure::StepName;
 use supple_ident::design::MAX_CANDIDATES;
 use supple_ident::paper::MIN_SAMPLES;
-use supple_ident::{FrictionChoice, FrictionColumns, Method};
+use supple_ident::{FrictionChoice, FrictionColumns, LoadTorque, Method};
 use supple_plant::Injection;
 
 /// Identification command.
@@ -100,8 +100,10 @@ pub enum FrictionArg {
     Offset,
     /// Viscous by direction, Coulomb and an offset.
     Asymmetric,
-    /// Viscous, and Coulomb that grows with the load.
+    /// Viscous, and Coulomb that grows with the load of the joint.
     Load,
+    /// Viscous, and Coulomb that grows with the torque of the motor.
+    MotorLoad,
 }
 
 /// Effects beside links and friction of the joints.
@@ -129,7 +131,11 @@ impl From<FrictionArg> for FrictionChoice {
                 ..FrictionColumns::COULOMB_AND_OFFSET
             },
             FrictionArg::Load => FrictionColumns {
-                load: true,
+                load: Some(LoadTorque::Joint),
+                ..FrictionColumns::COULOMB
+            },
+            FrictionArg::MotorLoad => FrictionColumns {
+                load: Some(LoadTorque::Motor),
                 ..FrictionColumns::COULOMB
             },
         };

@@ -96,7 +96,7 @@ impl<const N: usize> State<N> {
                     spring_limit_n: config.workspace.spring_limit_n(&tip),
                 };
                 let velocity = &self.estimator.velocity_rad_per_s;
-                let (law, friction) = (&config.law, &config.friction);
+                let (law, friction) = (&config.law, &self.friction);
                 let law_input = LawInput {
                     dry_direction: self.dry_direction.as_ref(),
                     friction_share: self.latch.friction_share(),
@@ -181,12 +181,12 @@ impl<const N: usize> State<N> {
     }
 
     /// Model feed-forward along a joint reference.
-    fn joint_feedforward(&self, config: &Config<N>, reference: &JointReference<N>) -> Torques<N> {
+    fn joint_feedforward(&self, reference: &JointReference<N>) -> Torques<N> {
         let velocity = &reference.velocity_rad_per_s;
         Torques {
             gravity: self.terms.gravity,
             coriolis: self.terms.coriolis_gravity - self.terms.gravity,
-            friction: Vector::from_fn(|i, _| config.friction[i].torque_nm(velocity[i])),
+            friction: Vector::from_fn(|i, _| self.friction[i].torque_nm(velocity[i])),
             inertial: self.terms.mass_matrix * reference.acceleration_rad_per_s2,
             ..Torques::zeros()
         }
@@ -201,7 +201,7 @@ impl<const N: usize> State<N> {
         };
         let gains = self.joint_gains.current();
         let velocity_error = reference.velocity_rad_per_s - self.estimator.velocity_rad_per_s;
-        let mut torques = self.joint_feedforward(config, &reference);
+        let mut torques = self.joint_feedforward(&reference);
         for joint in 0..N {
             if config.roles[joint] != Role::Active {
                 continue;
@@ -227,7 +227,7 @@ impl<const N: usize> State<N> {
         for joint in 0..N {
             if config.roles[joint] == Role::Active {
                 torques.friction[joint] =
-                    config.float_friction_share * config.friction[joint].torque_nm(velocity[joint]);
+                    config.float_friction_share * self.friction[joint].torque_nm(velocity[joint]);
             }
         }
         torques
@@ -246,7 +246,7 @@ impl<const N: usize> State<N> {
         let mut torques = Torques {
             joint_pd: gains.stiffness_nm_per_rad.component_mul(&position_error)
                 + gains.damping_nm_s_per_rad.component_mul(&velocity_error),
-            ..self.joint_feedforward(config, &reference)
+            ..self.joint_feedforward(&reference)
         };
         if let Activity::Breakaway { ramp, held_nm, .. } = &self.activity {
             torques.friction[ramp.joint] = ramp.rate_nm_per_s * self.activity_s(config);
@@ -264,7 +264,7 @@ impl<const N: usize> State<N> {
     ) -> Activity<N> {
         let (config, joint) = (controller.config(), ramp.joint);
         let stiffness = self.move_gains(controller).stiffness_nm_per_rad;
-        let constant_nm = |joint: usize| config.friction[joint].torque_nm(0.0);
+        let constant_nm = |joint: usize| self.friction[joint].torque_nm(0.0);
         let (mut from_rad, mut held_nm) = (self.position, 0.0);
         if let Some(setpoint_rad) = self.loop_setpoints_rad(config) {
             from_rad = setpoint_rad;
@@ -310,7 +310,7 @@ impl<const N: usize> State<N> {
         }
         self.enter(Activity::GravityHold);
         // A smaller torque is not what moves the joint: its gravity torque is wrong, or somebody pushes it.
-        let limit_nm = MOVING_SHARE_OF_BREAKAWAY * config.friction[joint].dry_size_nm(0.0);
+        let limit_nm = MOVING_SHARE_OF_BREAKAWAY * self.friction[joint].dry_size_nm(0.0);
         let value_nm = abs(torque_nm);
         let is_against = moved_rad * torque_nm < 0.0 && abs(moved_rad) >= ramp.stop_rad;
         if is_against && value_nm >= limit_nm {

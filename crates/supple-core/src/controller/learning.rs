@@ -125,7 +125,7 @@ impl<const N: usize> State<N> {
         };
         Some(LearnedAtPose::new(
             &self.learned.current,
-            &config.friction,
+            &self.friction,
             &config.limits,
             &config.arm.gravity(),
             &self.position,
@@ -138,7 +138,6 @@ impl<const N: usize> State<N> {
     /// motion: what the observer needs.
     pub(super) fn learned_in_observer(
         &self,
-        config: &Config<N>,
         learned: Option<&LearnedAtPose<N>>,
     ) -> (Vector<N>, Vector<N>) {
         let Some(learned) = learned else {
@@ -149,7 +148,7 @@ impl<const N: usize> State<N> {
         let scale = &terms.parameters.torque_scale;
         (
             Vector::from_fn(|i, _| (self.torque[i] - self.ripple[i]) / (1.0 + scale[i])),
-            learned.torque_nm(terms, &config.friction, velocity, None, 1.0),
+            learned.torque_nm(terms, &self.friction, velocity, None, 1.0),
         )
     }
 
@@ -168,7 +167,7 @@ impl<const N: usize> State<N> {
         let velocity = self.friction_velocity(config, task, reference, pose);
         let mut change = learned.torque_nm(
             terms,
-            &config.friction,
+            &self.friction,
             &velocity,
             self.dry_direction.as_ref(),
             self.latch.friction_share(),

@@ -328,7 +328,9 @@ fn check_joints<const N: usize>(
         if config.roles[joint] != Role::Active && qd[joint] == 0.0 {
             continue;
         }
-        let friction = config.friction[joint].torque_nm(qd[joint]);
+        let friction = config.friction[joint]
+            .at_load(dynamics.gravity[joint])
+            .torque_nm(qd[joint]);
         let limit_nm = TORQUE_SHARE * config.limits.joint_torque_nm[joint];
         let value_nm = abs(torque[joint] + friction);
         if value_nm > limit_nm {

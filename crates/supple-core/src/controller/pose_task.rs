@@ -190,7 +190,7 @@ impl<const N: usize> State<N> {
             / (damping * self.nullspace_mobility(&pose.task) * controller.delay_s()))
         .min(1.0);
         let law_input = LawInput {
-            friction: Some((&config.friction, law.friction_velocity)),
+            friction: Some((&self.friction, law.friction_velocity)),
             friction_share: self.latch.friction_share(),
             held_friction: self.held_friction(config),
             inertial_feedforward: law.inertial_feedforward,

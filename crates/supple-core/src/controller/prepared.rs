@@ -31,6 +31,8 @@ pub struct Controller<const N: usize> {
     pub(super) ripple_scales: bool,
     /// The travel of a joint's reversals is known.
     pub(super) has_presliding: bool,
+    /// The friction of a joint grows with its load.
+    pub(super) has_load_friction: bool,
     /// A joint is compliant between encoder and link.
     pub(super) has_compliance: bool,
     /// The estimator's gains after one period.
@@ -89,6 +91,7 @@ impl<const N: usize> Controller<N> {
                 .any(|table| !table.harmonics().is_empty()),
             ripple_scales: config.ripple.iter().any(RippleTable::scales_with_torque),
             has_presliding: config.friction.iter().any(|f| f.presliding_rad > 0.0),
+            has_load_friction: config.friction.iter().any(|f| f.load_coefficient > 0.0),
             has_compliance: config.compliance_rad_per_nm != Vector::<N>::zeros(),
             one_period: EstimatorGains::new(config.period_s, config.estimator_rad_per_s),
             encoder_step: EncoderStep::new(
@@ -134,6 +137,10 @@ impl<const N: usize> Controller<N> {
 
     pub(super) fn has_presliding(&self) -> bool {
         self.has_presliding
+    }
+
+    pub(super) fn has_load_friction(&self) -> bool {
+        self.has_load_friction
     }
 
     pub(super) fn has_compliance(&self) -> bool {

@@ -20,6 +20,7 @@ use crate::controller::learned_ramp::Learned;
 use crate::controller::observer::MomentumObserver;
 use crate::dynamics::Terms;
 use crate::math::{Vector, abs, all_finite};
+use crate::model::friction::Friction;
 
 /// Speed at which the set-point of a held joint approaches its angle \[rad/s\].
 const HELD_APPROACH_RAD_PER_S: f64 = 0.25;
@@ -49,6 +50,8 @@ pub struct State<const N: usize> {
     pub(super) latch: Latch,
     /// Joint velocities of the reference when contact was latched \[rad/s\].
     pub(super) contact_velocity_rad_per_s: Vector<N>,
+    /// Friction of the joints under their present load.
+    pub(super) friction: [Friction; N],
     /// Direction of the dry friction to feed forward; `None`: that of the velocity.
     pub(super) dry_direction: Option<Vector<N>>,
     pub(super) gains: GainRamp<Gains>,
@@ -103,6 +106,7 @@ impl<const N: usize> State<N> {
             observer: MomentumObserver::default(),
             latch: Latch::new(&config.latch, config.estimator_rad_per_s),
             contact_velocity_rad_per_s: Vector::zeros(),
+            friction: config.friction,
             dry_direction: None,
             gains: GainRamp::at_rest(config.law.gains),
             joint_gains: GainRamp::at_rest(config.joint_gains),
@@ -281,6 +285,14 @@ impl<const N: usize> State<N> {
             .compliance_rad_per_nm
             .component_mul(&self.terms.gravity);
         self.position -= self.elastic_deflection_rad;
+    }
+
+    /// The friction of each joint while its gear carries gravity, which is nearly all of its load in slow motion.
+    #[inline(never)]
+    pub(super) fn load_friction(&mut self, config: &Config<N>) {
+        for (i, friction) in config.friction.iter().enumerate() {
+            self.friction[i] = friction.at_load(self.terms.gravity[i]);
+        }
     }
 
     /// Latches a fault. The first fault is kept; the safe action can only change from gravity hold

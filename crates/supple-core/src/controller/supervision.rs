@@ -139,8 +139,8 @@ impl<const N: usize> State<N> {
         if elapsed_s > 0.0 {
             let velocity = &self.estimator.velocity_rad_per_s;
             let friction: Vector<N> =
-                Vector::from_fn(|i, _| config.friction[i].torque_nm(velocity[i]));
-            let (torque, learned) = self.learned_in_observer(config, learned);
+                Vector::from_fn(|i, _| self.friction[i].torque_nm(velocity[i]));
+            let (torque, learned) = self.learned_in_observer(learned);
             net_torque =
                 torque + self.terms.kinetic_gradient - self.terms.gravity - friction - learned;
             let bandwidth = config.latch.observer_rad_per_s;
@@ -167,7 +167,7 @@ impl<const N: usize> State<N> {
             };
             let friction_uncertainty_n = (0..N)
                 .map(|i| {
-                    let friction = &config.friction[i];
+                    let friction = &self.friction[i];
                     abs(along[i])
                         * friction.uncertainty_nm(velocity[i], config.latch.friction_error)
                 })
@@ -220,7 +220,7 @@ impl<const N: usize> State<N> {
         };
         let (config, joint) = (controller.config(), ramp.joint);
         let ramp_nm = ramp.rate_nm_per_s * self.activity_s(config);
-        let dry_nm = config.friction[joint].dry_size_nm(0.0);
+        let dry_nm = self.friction[joint].dry_size_nm(0.0);
         let inertia_kg_m2 = self.terms.mass_matrix[(joint, joint)];
         reference_rad_per_s[joint] = self.stuck_encoders.ramped_rad_per_s(
             controller.encoders(),

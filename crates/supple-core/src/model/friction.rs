@@ -12,12 +12,28 @@
 //! p' = v (1 - p sign(v)) / d
 //! ```
 //!
+//! Gears add dry friction in proportion to a torque, `L |tau|`: that which the joint carries, or that of the motor. The latter is
+//! `tau = g +- S` at a load `g`; friction is then greater where the motor drives the load than where the load drives the motor.
+//!
 //! As printed, the inner branch of (3.2) reads `S/delta (sign(v) v^2/delta + 2 v)`; at `|v| =
 //! delta` that is `3 S` where the outer branch is `S`. With the opposite sign of the parabola,
 //! value and slope are continuous: `D` is continuously differentiable in `v`.
 
 use crate::math::{abs, exp};
 use core::fmt;
+
+/// Greatest `load_coefficient`: with more, a gear could hardly be turned from its output.
+pub const MAX_LOAD_COEFFICIENT: f64 = 0.5;
+
+/// The torque in proportion to which a gear adds dry friction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum LoadTorque {
+    /// That which the joint carries.
+    #[default]
+    Joint,
+    /// That of the motor, which has to overcome friction as well.
+    Motor,
+}
 
 /// Friction of one joint. [`Friction::NONE`] is a frictionless joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +54,13 @@ pub struct Friction {
     /// `d`, travel over which dry friction turns round after a reversal \[rad\]; zero: its direction is that of the
     /// velocity.
     pub presliding_rad: f64,
+    /// `L`, dry friction that a torque on the gear adds, per torque, 0 to 0.5; zero: friction does not depend on the load.
+    pub load_coefficient: f64,
+    /// Which torque that is.
+    pub load_torque: LoadTorque,
+    /// Size of that torque at which dry friction is `coulomb_nm` and `breakaway_nm` \[N m\], zero or more;
+    /// `load_coefficient` times it is at most `coulomb_nm`.
+    pub coulomb_at_nm: f64,
 }
 
 /// The entry of a [`Friction`] that is not physical, with its value.
@@ -73,6 +96,9 @@ impl Friction {
         offset_nm: 0.0,
         band_rad_per_s: 0.01,
         presliding_rad: 0.0,
+        load_coefficient: 0.0,
+        load_torque: LoadTorque::Joint,
+        coulomb_at_nm: 0.0,
     };
 
     /// Viscous and Coulomb friction, the paper's `V` and `S`, with the default band and no Stribeck
@@ -120,12 +146,82 @@ impl Friction {
         )?;
         at_least("offset_nm", self.offset_nm, f64::MIN, "finite")?;
         at_least("presliding_rad", self.presliding_rad, 0.0, not_negative)?;
+        if !(0.0..=MAX_LOAD_COEFFICIENT).contains(&self.load_coefficient) {
+            return Err(FrictionError {
+                entry: "load_coefficient",
+                value: self.load_coefficient,
+                must: "from 0 to 0.5",
+            });
+        }
+        at_least("coulomb_at_nm", self.coulomb_at_nm, 0.0, not_negative)?;
+        at_least(
+            "coulomb_nm",
+            self.coulomb_nm,
+            self.load_coefficient * self.coulomb_at_nm,
+            "finite and at least load_coefficient times coulomb_at_nm",
+        )?;
         at_least(
             "band_rad_per_s",
             self.band_rad_per_s,
             f64::MIN_POSITIVE,
             "finite and positive",
         )
+    }
+
+    /// The friction in sliding while the joint carries `load_nm` \[N m\]: its dry part is the mean of both directions, half
+    /// of their difference is in the offset. The Stribeck effect is in proportion to the dry part.
+    #[inline]
+    pub fn at_load(&self, load_nm: f64) -> Friction {
+        let (share, size_nm) = (self.load_coefficient, abs(load_nm));
+        let unloaded_nm = self.coulomb_nm - share * self.coulomb_at_nm;
+        let loaded_nm = unloaded_nm + share * size_nm;
+        // S = S_u + L |g + S| where the motor drives the load; S = S_u + L |g - S| where the load drives the motor or,
+        // if it is small, helps it.
+        let (driving_nm, driven_nm) = match self.load_torque {
+            LoadTorque::Joint => (loaded_nm, loaded_nm),
+            LoadTorque::Motor if size_nm > unloaded_nm => {
+                (loaded_nm / (1.0 - share), loaded_nm / (1.0 + share))
+            }
+            LoadTorque::Motor => (
+                loaded_nm / (1.0 - share),
+                (unloaded_nm - share * size_nm) / (1.0 - share),
+            ),
+        };
+        let coulomb_nm = 0.5 * (driving_nm + driven_nm);
+        let offset_nm = (0.5 * (driving_nm - driven_nm)).copysign(load_nm);
+        let ratio = if self.coulomb_nm > 0.0 {
+            coulomb_nm / self.coulomb_nm
+        } else {
+            1.0
+        };
+        Friction {
+            coulomb_nm,
+            breakaway_nm: self.breakaway_nm * ratio,
+            offset_nm: self.offset_nm + offset_nm,
+            ..*self
+        }
+    }
+
+    /// `factor` times all of this friction, at `factor` times the load.
+    pub fn scaled(&self, factor: f64) -> Friction {
+        Friction {
+            viscous_nm_s_per_rad: self.viscous_nm_s_per_rad * factor,
+            coulomb_nm: self.coulomb_nm * factor,
+            breakaway_nm: self.breakaway_nm * factor,
+            offset_nm: self.offset_nm * factor,
+            coulomb_at_nm: self.coulomb_at_nm * factor,
+            ..*self
+        }
+    }
+
+    /// The same with `factor` times its dry friction, zero or more.
+    pub fn with_dry_scaled(&self, factor: f64) -> Friction {
+        Friction {
+            coulomb_nm: self.coulomb_nm * factor,
+            breakaway_nm: self.breakaway_nm * factor,
+            load_coefficient: (self.load_coefficient * factor).min(MAX_LOAD_COEFFICIENT),
+            ..*self
+        }
     }
 
     /// Uncertainty of the dry friction at `velocity_rad_per_s` \[N m\]: all of it at rest, where

@@ -4,6 +4,7 @@
 use crate::support::settings::config;
 use proptest::prelude::*;
 use supple_core::Friction;
+use supple_core::friction::LoadTorque;
 
 /// Parameters of the paper's shoulder pitch.
 const SHOULDER: Friction = Friction::coulomb(1.9823, 1.4985);
@@ -31,7 +32,7 @@ fn any_friction() -> impl Strategy<Value = Friction> {
             stribeck_rad_per_s: stribeck,
             offset_nm: offset,
             band_rad_per_s: band,
-            presliding_rad: 0.0,
+            ..Friction::NONE
         })
 }
 
@@ -181,7 +182,7 @@ fn invalid_friction_is_rejected() {
     type Entry = (&'static str, fn(&mut Friction, f64), &'static [f64]);
     const NAN: f64 = f64::NAN;
     const INF: f64 = f64::INFINITY;
-    let entries: [Entry; 6] = [
+    let entries: [Entry; 9] = [
         (
             "viscous_nm_s_per_rad",
             |f, x| f.viscous_nm_s_per_rad = x,
@@ -204,6 +205,21 @@ fn invalid_friction_is_rejected() {
             |f, x| f.band_rad_per_s = x,
             &[0.0, -0.1, NAN, INF],
         ),
+        (
+            "presliding_rad",
+            |f, x| f.presliding_rad = x,
+            &[-0.1, NAN, INF],
+        ),
+        (
+            "load_coefficient",
+            |f, x| f.load_coefficient = x,
+            &[-0.1, 0.51, NAN, INF],
+        ),
+        (
+            "coulomb_at_nm",
+            |f, x| f.coulomb_at_nm = x,
+            &[-0.1, NAN, INF],
+        ),
     ];
     for (entry, spoil, values) in entries {
         for &value in values {
@@ -212,9 +228,74 @@ fn invalid_friction_is_rejected() {
             let error = friction.validate().expect_err(entry);
             assert_eq!(error.entry, entry);
             let text = error.to_string();
-            let start = format!("{entry} is {value}, it must be finite");
+            let start = format!("{entry} is {value}, it must be f");
             assert!(text.starts_with(&start), "{text:?} against {start:?}");
         }
+    }
+}
+
+/// Without a motor's torque there would be dry friction below zero.
+#[test]
+fn friction_below_zero_without_load_is_rejected() {
+    let law = |coulomb_at_nm: f64| Friction {
+        load_coefficient: 0.5,
+        coulomb_at_nm,
+        ..WITH_DIP
+    };
+    assert_eq!(law(2.0 * WITH_DIP.coulomb_nm).validate(), Ok(()));
+    let error = law(2.1 * WITH_DIP.coulomb_nm).validate().unwrap_err();
+    assert_eq!(error.entry, "coulomb_nm");
+    assert!(
+        error
+            .to_string()
+            .contains("load_coefficient times coulomb_at_nm")
+    );
+}
+
+const WITH_LOAD: Friction = Friction {
+    load_coefficient: 0.1,
+    load_torque: LoadTorque::Motor,
+    coulomb_at_nm: 4.0,
+    breakaway_nm: WITH_DIP.coulomb_nm,
+    offset_nm: 0.0,
+    ..WITH_DIP
+};
+
+/// In sliding dry friction is that without load and the coefficient times the motor's torque, which overcomes load and
+/// friction.
+#[test]
+fn dry_friction_grows_with_the_torque_of_the_motor() {
+    let unloaded_nm = WITH_LOAD.coulomb_nm - 0.1 * 4.0;
+    for load_nm in [-9.0, -1.5, -0.3, 0.0, 0.4, 1.0, 1.1, 3.0, 12.0] {
+        let loaded = WITH_LOAD.at_load(load_nm);
+        assert_eq!(loaded.validate(), Ok(()));
+        for v in [-1.0, -0.03, 0.02, 0.7] {
+            let dry_nm = loaded.torque_nm(v) - loaded.viscous_nm_s_per_rad * v;
+            let motor_nm = load_nm + dry_nm;
+            let expected_nm = (unloaded_nm + 0.1 * motor_nm.abs()) * f64::signum(v);
+            close(dry_nm, expected_nm, 1e-12);
+        }
+    }
+    assert_eq!(WITH_DIP.at_load(9.0), WITH_DIP);
+    let of_joint = Friction {
+        load_torque: LoadTorque::Joint,
+        ..WITH_LOAD
+    };
+    for load_nm in [-9.0, 0.0, 4.0] {
+        let loaded = of_joint.at_load(load_nm);
+        close(loaded.coulomb_nm, unloaded_nm + 0.1 * load_nm.abs(), 1e-12);
+        close(loaded.offset_nm, 0.0, 1e-12);
+    }
+}
+
+#[test]
+fn scaled_dry_friction_is_scaled_without_load() {
+    for factor in [0.5, 1.3, 0.0] {
+        let scaled = WITH_LOAD.with_dry_scaled(factor);
+        assert_eq!(scaled.validate(), Ok(()));
+        close(scaled.coulomb_nm, factor * WITH_LOAD.coulomb_nm, 1e-12);
+        close(scaled.load_coefficient, factor * 0.1, 1e-12);
+        assert_eq!(scaled.viscous_nm_s_per_rad, WITH_LOAD.viscous_nm_s_per_rad);
     }
 }
 

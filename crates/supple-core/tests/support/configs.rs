@@ -224,7 +224,7 @@ pub fn friction<const N: usize>() -> [Friction; N] {
         stribeck_rad_per_s: 0.05,
         offset_nm: 0.1 - 0.05 * i as f64,
         band_rad_per_s: 0.01,
-        presliding_rad: 0.0,
+        ..Friction::NONE
     })
 }
 

@@ -9,7 +9,8 @@ use crate::scenario::STIFFNESS_N_PER_M;
 use nalgebra::DMatrix;
 use std::path::Path;
 use supple_core::controller::Mode;
-use supple_core::{Config, Vector};
+use supple_core::friction::LoadTorque;
+use supple_core::{Config, RippleTable, Vector};
 use supple_ident::{Fit, FrictionColumns, Log, Motion, ReadError};
 use supple_log::Reader;
 use supple_model::{Description, IdentifiedModel, MinimumThresholds};
@@ -20,6 +21,8 @@ const HELD_OUT_FRACTION: f64 = 0.25;
 const MAX_START_TIME_S: f64 = 0.1;
 /// Minimum range of angles of each joint in a motion that is fitted \[rad\].
 const MIN_RANGE_RAD: f64 = 0.05;
+/// Greatest collision threshold that friction may make necessary, as a fraction of the joint's torque limit.
+const MAX_THRESHOLD_SHARE: f64 = 0.5;
 /// Minimum collision threshold of a joint in the modes with stiff joint loops, as a fraction of the one in the description.
 const MIN_THRESHOLD_FRACTION: f64 = 0.5;
 /// Minimum and maximum ratio of measured to described breakaway torque by which the dry friction is scaled.
@@ -94,14 +97,13 @@ pub fn scale_dry_friction<const N: usize>(
 ) -> Result<Description, ProcedureError> {
     let config = model.config::<N>()?;
     let friction = core::array::from_fn(|joint| {
-        let mut friction = config.friction[joint];
+        let friction = config.friction[joint];
         if let Some(found) = breakaway.get(joint)
             && friction.breakaway_nm > 0.0
         {
             let (min, max) = BREAKAWAY_RATIO_RANGE;
             let ratio = (found.breakaway_nm() / friction.breakaway_nm).clamp(min, max);
-            friction.breakaway_nm *= ratio;
-            friction.coulomb_nm *= ratio;
+            return friction.with_dry_scaled(ratio);
         }
         friction
     });
@@ -159,13 +161,7 @@ pub fn fit_first<const N: usize>(
     let (fitted, held_out) = (part(excitation, 0, cut), part(excitation, cut, rows - cut));
     let mut logs = vec![fitted];
     logs.extend_from_slice(others);
-    let (fit, _) = identify_with(
-        &config,
-        &logs,
-        &[],
-        &fit_options(model),
-        min_fitted_rad_per_s(&logs),
-    )?;
+    let (fit, _) = identify_best(model, &config, &logs, &[])?;
     let quality = quality(&config, &fit, &prepared(&held_out, &fit)?)?;
     let is_better = quality.validation_relative < quality.validation_relative_before;
     if !is_better {
@@ -190,8 +186,7 @@ pub fn fit_all<const N: usize>(
     others: &[Log],
 ) -> Result<(Description, FitQuality), ProcedureError> {
     let config = model.config::<N>()?;
-    let (options, min_rad_per_s) = (fit_options(model), min_fitted_rad_per_s(logs));
-    let (fit, ripple) = identify_with(&config, logs, constant_speed, &options, min_rad_per_s)?;
+    let (fit, ripple) = identify_best(model, &config, logs, constant_speed)?;
     let motor_from_joint = *supple_core::Controller::new(config)?.motor_from_joint();
     let validation = with_ripple_torque(validation, &ripple, &motor_from_joint);
     let validation = prepared(&validation, &fit)?;
@@ -203,6 +198,11 @@ pub fn fit_all<const N: usize>(
         let log = with_ripple_torque(log, &ripple, &motor_from_joint);
         validations.push(fit.validate_motion(&prepared(&log, &fit)?)?);
     }
+    let described = match model.bus() {
+        Some(_) => raise_thresholds(&described, &fit.collision_nm(&validations, &config))?,
+        None => described,
+    };
+    let config = described.config::<N>()?;
     let present_nm = config.collision.move_joint_torque_nm;
     let mut thresholds = fit.move_collision_nm(&validations, &config);
     for (joint, threshold_nm) in thresholds.iter_mut().enumerate() {
@@ -210,22 +210,27 @@ pub fn fit_all<const N: usize>(
         let min_nm = MIN_THRESHOLD_FRACTION * present_nm[joint];
         *threshold_nm = threshold_nm.map(|nm| nm.max(min_nm));
     }
-    let described = match model.bus() {
-        Some(_) => raise_against_share::<N>(&described)?,
-        None => described,
-    };
     Ok((described.with_move_collision(&thresholds)?, quality))
 }
 
-/// `model` with `plausible.against_share`, the limit for torque against a joint's acceleration, above the dry friction: when a
-/// joint begins to move, the torque may still have the other sign by that much.
-fn raise_against_share<const N: usize>(model: &Description) -> Result<Description, ProcedureError> {
+/// `model` with thresholds that its dry friction does not exceed: the collision thresholds of its joints are at least `least_nm`,
+/// up to half of their torque limits, and `plausible.against_share`, the limit for torque against a joint's acceleration, is
+/// above the dry friction: when a joint begins to move, the torque may still have the other sign by that much.
+fn raise_thresholds<const N: usize>(
+    model: &Description,
+    least_nm: &[Option<f64>; N],
+) -> Result<Description, ProcedureError> {
     let config = model.config::<N>()?;
     let limits_nm = &config.limits.joint_torque_nm;
+    let raised_nm = |j: usize| {
+        let present_nm = config.collision.joint_torque_nm[j];
+        let least_nm = least_nm[j].unwrap_or(0.0);
+        present_nm.max(least_nm.min(MAX_THRESHOLD_SHARE * limits_nm[j]))
+    };
     let dry = Vector::<N>::from_fn(|j, _| config.friction[j].breakaway_nm / limits_nm[j]);
     let minimum = MinimumThresholds {
         move_share: 0.0,
-        joint_torque_nm: None,
+        joint_torque_nm: Some((0..N).map(raised_nm).collect()),
         tip_force_n: 0.0,
         hold_pose: false,
         load_n: 0.0,
@@ -234,20 +239,43 @@ fn raise_against_share<const N: usize>(model: &Description) -> Result<Descriptio
     Ok(model.with_minimum_thresholds(&minimum)?)
 }
 
-/// Friction terms and priors of the fit. Arms with `[bus]` have geared motors, whose friction grows with their load. Gravity
+/// [`identify_with`] with those of [`fit_options`] that leave the smallest part of the torques unexplained.
+fn identify_best<const N: usize>(
+    model: &Description,
+    config: &Config<N>,
+    logs: &[Log],
+    constant_speed: &[Log],
+) -> Result<(Fit<N>, [RippleTable; N]), ProcedureError> {
+    let min_rad_per_s = min_fitted_rad_per_s(logs);
+    let (first, others) = fit_options(model);
+    let mut best = identify_with(config, logs, constant_speed, &first, min_rad_per_s)?;
+    for options in &others {
+        let other = identify_with(config, logs, constant_speed, options, min_rad_per_s)?;
+        if other.0.training_relative < best.0.training_relative {
+            best = other;
+        }
+    }
+    Ok(best)
+}
+
+/// Friction terms and priors of the fits to try. Arms with `[bus]` have geared motors, whose friction grows with their load. Gravity
 /// leaves them little torque, so that they move slowly and their torques contain little information about the inertia: without a
 /// prior, errors of the friction model would be fitted as inertias of rotors and links.
-fn fit_options(model: &Description) -> FitOptions {
-    match model.bus() {
-        None => FitOptions::new(FrictionColumns::COULOMB_AND_OFFSET),
-        Some(_) => FitOptions {
-            friction: FrictionColumns {
-                load: true,
-                ..FrictionColumns::COULOMB_AND_OFFSET
-            },
-            prior_weight: GEARED_PRIOR_WEIGHT,
-            rotor_deviation: Some(GEARED_ROTOR_DEVIATION),
+fn fit_options(model: &Description) -> (FitOptions, Vec<FitOptions>) {
+    let geared = |load: LoadTorque| FitOptions {
+        friction: FrictionColumns {
+            load: Some(load),
+            ..FrictionColumns::COULOMB_AND_OFFSET
         },
+        prior_weight: GEARED_PRIOR_WEIGHT,
+        rotor_deviation: Some(GEARED_ROTOR_DEVIATION),
+    };
+    match model.bus() {
+        None => (
+            FitOptions::new(FrictionColumns::COULOMB_AND_OFFSET),
+            Vec::new(),
+        ),
+        Some(_) => (geared(LoadTorque::Joint), vec![geared(LoadTorque::Motor)]),
     }
 }
 

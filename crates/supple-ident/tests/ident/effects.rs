@@ -6,9 +6,10 @@ use supple_core::nalgebra::Rotation3;
 use supple_core::{Arm, Config, Friction, Vector};
 use supple_ident::columns::Column;
 use supple_ident::regressor::rows;
+use supple_ident::select::{compare, load_candidates};
 use supple_ident::{
-    Columns, DMatrix, Effects, FrictionColumns, Learning, Motion, Options, fit, learn,
-    presliding_rad,
+    Columns, DMatrix, Effects, FrictionColumns, Learning, LoadTorque, Motion, Options,
+    feedforward_nm, fit, learn, presliding_rad,
 };
 use supple_model::Description;
 
@@ -178,7 +179,7 @@ fn description_of_a_fit_has_its_effects_and_no_older_ones() {
             springs: true,
             tilt: true,
             compliance: true,
-            motor_from_joint: None,
+            ..Effects::default()
         },
         consistent_prior_weight: Some(1e-4),
         ..Options::default()
@@ -209,6 +210,99 @@ fn description_of_a_fit_has_its_effects_and_no_older_ones() {
         LearnedTerms::zero()
     );
     assert!(!described.toml().contains("[learned"));
+}
+
+/// Motors that give different shares of what they are commanded: one set of links explains all joints once each has a scale, and
+/// a controller with the model and the scales commands the torques of another motion.
+#[test]
+fn torque_scales_that_differ_between_motors_are_found() {
+    let nominal = Description::asset("wam4").unwrap();
+    let config = wam4();
+    let shares = [0.03, -0.04, 0.02, -0.03];
+    let commanded = |mut motion: Motion| {
+        for (j, share) in shares.iter().enumerate() {
+            motion.tau.column_mut(j).scale_mut(1.0 + share);
+        }
+        motion
+    };
+    let motion = commanded(spring_motion(&config, 0.0));
+    let with = |torque_scale: bool| Options {
+        effects: Effects {
+            torque_scale,
+            ..Effects::default()
+        },
+        consistent_prior_weight: Some(10.0),
+        ..Options::default()
+    };
+    let residual_nm = |torque_scale: bool| {
+        let options = with(torque_scale);
+        let found = fit(&config.arm, core::slice::from_ref(&motion), &ALL, &options).unwrap();
+        let described = found.description(&nominal, None).unwrap();
+        let found_config = described.config::<4>().unwrap();
+        let error = feedforward_nm(&found_config, &motion) - &motion.tau;
+        (found, error.norm() / motion.tau.norm())
+    };
+    let (_, without) = residual_nm(false);
+    let (found, with) = residual_nm(true);
+    assert!(with < 0.003 && with < 0.3 * without, "{with}, {without}");
+    // What all have in common is in the links.
+    let scale = found.torque_scale();
+    for j in 1..4 {
+        let ratio = (1.0 + scale[j]) / (1.0 + scale[0]);
+        let expected = (1.0 + shares[j]) / (1.0 + shares[0]);
+        assert!(
+            (ratio - expected).abs() < 0.01,
+            "joint {j}: {ratio}, {expected}"
+        );
+    }
+}
+
+/// Friction of gears that grows with the torque of the motor: its coefficient is found, cross-validation tells it from friction
+/// that grows with the load of the joint, and the controller commands what the arm needs.
+#[test]
+fn friction_that_grows_with_the_motors_torque_is_found() {
+    let nominal = Description::asset("wam4").unwrap();
+    let config = wam4();
+    let mut motion = spring_motion(&config, 0.0);
+    for i in 0..motion.samples() {
+        for j in ALL {
+            let friction = &config.friction[j];
+            let qd = motion.qd[(i, j)];
+            let direction = friction.direction(qd);
+            // tau = rest + L |tau| p, rest being all but the friction that grows.
+            let rest_nm = motion.tau[(i, j)];
+            let more = direction * 0.1;
+            motion.tau[(i, j)] = rest_nm / (1.0 - more * rest_nm.signum());
+        }
+    }
+    let base = Options {
+        consistent_prior_weight: Some(1e-4),
+        ..Options::default()
+    };
+    let candidates = load_candidates(&base);
+    let motions = [motion];
+    let table = compare(&config.arm, &motions, &ALL, &candidates, 4).unwrap();
+    assert_eq!(table.options().friction.load, Some(LoadTorque::Motor));
+    let found = fit(&config.arm, &motions, &ALL, table.options()).unwrap();
+    let described = found.description(&nominal, None).unwrap();
+    let found_config = described.config::<4>().unwrap();
+    for friction in &found_config.friction {
+        assert!(
+            (friction.load_coefficient - 0.1).abs() < 0.01,
+            "{friction:?}"
+        );
+        assert_eq!(friction.load_torque, LoadTorque::Motor);
+    }
+    // The controller takes the load of gravity alone; this motion is fast.
+    let without = fit(&config.arm, &motions, &ALL, &base).unwrap();
+    let without = without.description(&nominal, None).unwrap();
+    let [motion] = &motions;
+    let residual_nm = |config: &Config<4>| (feedforward_nm(config, motion) - &motion.tau).norm();
+    let (with, without) = (
+        residual_nm(&found_config),
+        residual_nm(&without.config::<4>().unwrap()),
+    );
+    assert!(with < 0.8 * without, "{with}, {without}");
 }
 
 /// A fit of some joints leaves compliance and springs of the others as they were.

@@ -5,6 +5,7 @@ use crate::support::{motion, random_arm};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 use supple_core::dynamics::{parameters, rnea};
+use supple_core::friction::LoadTorque;
 use supple_core::{Arm, Friction, Vector};
 use supple_ident::{Columns, DMatrix, FrictionColumns, Options, Weights, fit};
 use supple_random::Random;
@@ -258,7 +259,7 @@ fn load_dependent_friction_is_identified() {
     };
     let options = Options {
         friction: FrictionColumns {
-            load: true,
+            load: Some(LoadTorque::Joint),
             ..FrictionColumns::COULOMB_AND_OFFSET
         },
         consistent_prior_weight: Some(1e-6),
@@ -269,14 +270,17 @@ fn load_dependent_friction_is_identified() {
     for j in 0..3 {
         let value = fit.x[names.iter().position(|n| *n == format!("L{j}")).unwrap()];
         assert!((value - 0.05).abs() < 1e-4, "{value}");
-        // The controller's friction law has no load term; it receives the friction at the mean load.
-        let coulomb_nm = fit.friction()[j].coulomb_nm - friction::<3>()[j].coulomb_nm;
+        // The controller is given the friction at the mean load, and how it grows with the load.
+        let (found, unloaded) = (fit.friction()[j], friction::<3>()[j]);
+        let more_nm = found.coulomb_nm - unloaded.coulomb_nm;
         let mean_nm = 0.05 * fit.load_nm[j];
-        assert!(
-            (coulomb_nm - mean_nm).abs() < 1e-3,
-            "{coulomb_nm} {mean_nm}"
-        );
+        assert!((more_nm - mean_nm).abs() < 1e-3, "{more_nm} {mean_nm}");
         assert!(fit.load_nm[j] > 0.0);
+        for load_nm in [0.0, 8.0, -20.0_f64] {
+            let expected_nm = unloaded.coulomb_nm + 0.05 * load_nm.abs();
+            let found_nm = found.at_load(load_nm).coulomb_nm;
+            assert!((found_nm - expected_nm).abs() < 1e-2, "{found_nm}");
+        }
     }
     assert!(fit.validate_motion(&loaded(10)).unwrap().total_relative < 1e-4);
     let load_only = FrictionColumns {

@@ -2,6 +2,7 @@
 
 use crate::support::{motion, random_arm};
 use supple_core::dynamics::gravity;
+use supple_core::friction::LoadTorque;
 use supple_core::{Friction, Vector};
 use supple_ident::select::{compare, friction_candidates, load_candidates, prior_candidates};
 use supple_ident::{
@@ -75,8 +76,8 @@ fn load_independent_friction_is_not_reported_as_load_dependent() {
             loaded.tau[(i, j)] += 0.1 * passed_on[j].abs() * dry.dry_torque_nm(loaded.qd[(i, j)]);
         }
     }
-    assert!(!choose(steady));
-    assert!(choose(loaded));
+    assert_eq!(choose(steady), None);
+    assert_eq!(choose(loaded), Some(LoadTorque::Joint));
     assert!(
         load_candidates(&Options {
             friction: FrictionColumns::NONE,

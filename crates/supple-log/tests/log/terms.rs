@@ -6,6 +6,7 @@ use std::path::Path;
 use supple_core::config::{ApparentInertia, RippleTable, Role};
 use supple_core::controller::{CycleRecord, LearningSwitch, Mode, Request};
 use supple_core::dynamics::aba;
+use supple_core::friction::LoadTorque;
 use supple_core::learned::LearnedParameters;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::record::{Cell, for_each_column};
@@ -25,6 +26,9 @@ fn config() -> Config<N> {
     let home = common::description().home::<N>().expect("four joints");
     let friction = Friction {
         presliding_rad: 2e-3,
+        load_coefficient: 0.1,
+        load_torque: LoadTorque::Motor,
+        coulomb_at_nm: 0.2,
         ..Friction::coulomb(0.02, 0.05)
     };
     let harmonic = Harmonic {

@@ -13,7 +13,7 @@ const LAW: Friction = Friction {
     stribeck_rad_per_s: 0.05,
     offset_nm: 0.0,
     band_rad_per_s: 0.01,
-    presliding_rad: 0.0,
+    ..Friction::NONE
 };
 
 /// A wheel on a horizontal axis through its centre of mass: only inertia and friction.

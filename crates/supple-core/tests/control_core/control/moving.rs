@@ -7,7 +7,7 @@ use crate::support::{assert_close, size};
 use supple_core::config::Role;
 use supple_core::controller::{Mode, Request};
 use supple_core::dynamics::{coriolis, crba, gravity};
-use supple_core::{Config, Output, Vector};
+use supple_core::{Config, Friction, Output, Vector};
 
 const DURATION_S: f64 = 0.8;
 
@@ -55,7 +55,12 @@ fn is_the_move<const N: usize>(config: &Config<N>, output: &Output<N>) {
     let inertial = crba(&config.arm, q) * acceleration;
     assert_close(&torques.inertial, &inertial, 1e-9);
     assert_close(&torques.joint_pd, &loops, 1e-8);
-    let rubbing = Vector::<N>::from_fn(|i, _| config.friction[i].torque_nm(velocity[i]));
+    let load_nm = gravity(&config.arm, q);
+    let rubbing = Vector::<N>::from_fn(|i, _| {
+        config.friction[i]
+            .at_load(load_nm[i])
+            .torque_nm(velocity[i])
+    });
     assert_close(&torques.friction, &rubbing, 1e-9);
     for (name, torque) in torques.named() {
         let expected = [
@@ -68,7 +73,11 @@ fn is_the_move<const N: usize>(config: &Config<N>, output: &Output<N>) {
 
 fn moves<const N: usize>(mut config: Config<N>) {
     unlimited(&mut config);
-    config.friction = friction();
+    config.friction = friction().map(|friction| Friction {
+        load_coefficient: 0.08,
+        coulomb_at_nm: 2.0,
+        ..friction
+    });
     config.handover_s = 0.05;
     let mut rig = Rig::holding(config, bent());
     let mut output = rig.accept(Request::Move {
