@@ -80,7 +80,7 @@ fn noise_of_the_velocity_teaches_nothing() {
         assert_eq!(output.fault, None);
         greatest = greatest.max(output.torques.learned.amax());
     }
-    assert!(world.requests.len() > 10, "{}", world.requests.len());
+    assert!(world.requests.len() >= 5);
     assert!(greatest < 0.02, "{greatest} N m");
 }
 
