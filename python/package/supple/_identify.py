@@ -112,8 +112,9 @@ def identify(
         least squares.
     friction : "auto", {"none", "viscous", "coulomb", "offset", "asymmetric", "load", "stribeck"} or FrictionColumns
         Friction columns of every moving joint. ``"auto"`` chooses by cross-validation. ``"load"``:
-        viscous and Coulomb friction that grows with the load of the joint. ``"stribeck"``: viscous and Coulomb friction with offset, and a Stribeck
-        effect whose parameters are fitted to slow motion in a second stage.
+        viscous and Coulomb friction that grows with the load of the joint. ``"stribeck"``: viscous and
+        Coulomb friction with offset, and a Stribeck effect whose parameters are fitted to slow motion in
+        a second stage.
     rate_hz : float, optional
         Rate of the regular grid to which the log is resampled (Hz). Default: the log's own mean rate.
     keep_every : int

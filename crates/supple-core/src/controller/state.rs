@@ -289,7 +289,7 @@ impl<const N: usize> State<N> {
 
     /// The friction of each joint while its gear carries gravity, which is nearly all of its load in slow motion.
     #[inline(never)]
-    pub(super) fn load_friction(&mut self, config: &Config<N>) {
+    pub(super) fn update_friction(&mut self, config: &Config<N>) {
         for (i, friction) in config.friction.iter().enumerate() {
             self.friction[i] = friction.at_load(self.terms.gravity[i]);
         }

@@ -33,7 +33,7 @@ pub fn step<const N: usize>(
     let velocity = state.estimator.velocity_rad_per_s;
     terms(&config.arm, &state.position, &velocity, &mut state.terms);
     if controller.has_load_friction() {
-        state.load_friction(config);
+        state.update_friction(config);
     }
     let task = Task::with_count(&state.terms, &config.roles, controller.active_joints());
     if task.is_none() {
