@@ -3,6 +3,19 @@
 use crate::qr_reduction::{CHUNK, ReducedSystem};
 use nalgebra::{DMatrix, DVector};
 use std::sync::OnceLock;
+use supple_core::friction::MAX_LOAD_COEFFICIENT;
+
+/// What predicts friction that grows with the torque of the motor: its column contains the measured torque, which a
+/// prediction may not use.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MotorLoad {
+    /// The column of this friction.
+    pub column: usize,
+    /// Its values if the motor transmitted 1 N m, -1 to 1.
+    pub direction: Vec<f64>,
+    /// Torque of a known rotor, which `b` does not contain \[N m\].
+    pub rotor_nm: Vec<f64>,
+}
 
 /// The rows of one moving joint: `a x = b`, one row for each sample.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,6 +30,8 @@ pub struct JointRows {
     pub travel_since_reversal_rad: Vec<f64>,
     /// Whether the sample is used.
     pub used: Vec<bool>,
+    /// Friction that grows with the torque of the motor, if there is a column for it.
+    pub motor_load: Option<MotorLoad>,
     /// Cached QR reduction of the rows above a given speed.
     cached: OnceLock<(f64, ReducedSystem)>,
 }
@@ -27,6 +42,7 @@ impl JointRows {
         JointRows {
             travel_since_reversal_rad: vec![f64::INFINITY; speed.len()],
             used: vec![true; speed.len()],
+            motor_load: None,
             a,
             b,
             speed,
@@ -44,9 +60,25 @@ impl JointRows {
         make().1
     }
 
-    /// `a x - b` of the samples that are used.
+    /// Torques predicted from the motion alone, those of known rotors left out \[N m\].
+    pub fn predicted(&self, x: &DVector<f64>) -> DVector<f64> {
+        let mut torque = &self.a * x;
+        let Some(load) = &self.motor_load else {
+            return torque;
+        };
+        let coefficient = x[load.column];
+        for (i, torque) in torque.iter_mut().enumerate() {
+            let rest = *torque - self.a[(i, load.column)] * coefficient + load.rotor_nm[i];
+            // The torque t of the motor fulfils t = rest + coefficient direction |t|, and has the sign of the rest.
+            let share = coefficient * load.direction[i] * rest.signum();
+            *torque = rest / (1.0 - share.min(MAX_LOAD_COEFFICIENT)) - load.rotor_nm[i];
+        }
+        torque
+    }
+
+    /// Predicted minus measured torques of the samples that are used \[N m\].
     pub fn residual(&self, x: &DVector<f64>) -> Vec<f64> {
-        let all = &self.a * x - &self.b;
+        let all = self.predicted(x) - &self.b;
         let pairs = all.iter().zip(&self.used);
         pairs.filter(|(_, used)| **used).map(|(r, _)| *r).collect()
     }
@@ -64,7 +96,12 @@ impl JointRows {
             b: self.b.rows_range(range.clone()).into_owned(),
             speed: self.speed[range.clone()].to_vec(),
             travel_since_reversal_rad: self.travel_since_reversal_rad[range.clone()].to_vec(),
-            used: self.used[range].to_vec(),
+            used: self.used[range.clone()].to_vec(),
+            motor_load: self.motor_load.as_ref().map(|load| MotorLoad {
+                column: load.column,
+                direction: load.direction[range.clone()].to_vec(),
+                rotor_nm: load.rotor_nm[range].to_vec(),
+            }),
             cached: OnceLock::new(),
         }
     }

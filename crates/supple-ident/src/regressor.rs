@@ -5,6 +5,7 @@ use crate::effect_rows::EffectState;
 use crate::error::{IdentError, shape_error};
 use crate::filter::LowPass;
 pub use crate::joint_rows::JointRows;
+use crate::joint_rows::MotorLoad;
 use crate::motion::Motion;
 use nalgebra::DMatrix;
 use supple_core::dynamics::{parameters, regressor, regressor_times};
@@ -49,10 +50,7 @@ pub(crate) fn rows_under_load<const N: usize>(
         (Some(LoadTorque::Motor), Some(motor_nm)) => Some(*motor_nm),
         _ => links,
     };
-    let dry = Friction {
-        band_rad_per_s: friction.band_rad_per_s,
-        ..Friction::coulomb(0.0, 1.0)
-    };
+    let dry = unit_dry_friction(columns);
     let effects = EffectState::new(arm, columns.effects(), q);
     let moving = columns.moving();
     let mut rows = DMatrix::zeros(moving.len(), columns.len());
@@ -103,6 +101,14 @@ pub(crate) fn rows_under_load<const N: usize>(
         }
     }
     rows
+}
+
+/// Dry friction of 1 N m in the band of the columns.
+fn unit_dry_friction(columns: &Columns) -> Friction {
+    Friction {
+        band_rad_per_s: columns.friction().band_rad_per_s,
+        ..Friction::coulomb(0.0, 1.0)
+    }
 }
 
 /// Travel of joint `j` since its last reversal, for each sample.
@@ -167,6 +173,18 @@ pub fn joint_rows<const N: usize>(
             joint.a.row_mut(i).copy_from(&state.row(row));
         }
     }
+    if columns.friction().load == Some(LoadTorque::Motor) {
+        let dry = unit_dry_friction(columns);
+        for (joint, &j) in joints.iter_mut().zip(moving) {
+            joint.motor_load = columns.position(Column::Load(j)).map(|column| MotorLoad {
+                column,
+                direction: (motion.qd.column(j).iter())
+                    .map(|qd| dry.dry_torque_nm(*qd))
+                    .collect(),
+                rotor_nm: (motion.qdd.column(j) * known_rotor(j)).as_slice().to_vec(),
+            });
+        }
+    }
     if let Some(cutoff_hz) = motion.cutoff_hz {
         let filter = LowPass::butterworth4(cutoff_hz, motion.rate_hz)?;
         for (c, _) in columns
@@ -179,6 +197,12 @@ pub fn joint_rows<const N: usize>(
                 let smooth = filter.zero_phase(joint.a.column(c).clone_owned().as_slice())?;
                 joint.a.column_mut(c).copy_from_slice(&smooth);
             }
+        }
+        for load in joints
+            .iter_mut()
+            .filter_map(|joint| joint.motor_load.as_mut())
+        {
+            load.direction = filter.zero_phase(&load.direction)?;
         }
     }
     Ok(joints)

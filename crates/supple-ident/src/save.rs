@@ -14,6 +14,8 @@ pub const RESIDUAL_MARGIN: f64 = 3.0;
 /// Part of the collision threshold over the breakaway torque: where a joint reverses, the dry friction of the model and the
 /// true one may have opposite signs.
 const REVERSAL_MARGIN: f64 = 2.0;
+/// Part of the collision threshold over the joint's torque limit: motions beyond the logs, and what a drive does not resolve.
+const LIMIT_SHARE: f64 = 0.005;
 
 /// Error of saving a fit.
 #[derive(Debug, thiserror::Error)]
@@ -96,17 +98,19 @@ impl<const N: usize> Fit<N> {
     }
 
     /// The least collision thresholds that the model itself does not exceed, from its residual on held-out motions \[N m\]:
-    /// three times the greatest residual of the joint, and twice its breakaway torque at half of its torque limit. `None` for a
-    /// joint that did not move.
+    /// three times the greatest residual of the joint, twice its breakaway torque at half of its torque limit, and 0.5 % of that
+    /// limit. `None` for a joint that did not move.
     pub fn collision_nm(&self, held_out: &[Validation], of: &Config<N>) -> [Option<f64>; N] {
         let friction = self.friction_with(&of.friction);
         let mut thresholds = [None; N];
         for (row, joint) in self.columns.moving().iter().enumerate() {
             let peaks = held_out.iter().map(|log| log.peak_nm[row]);
             let peak_nm = peaks.fold(0.0, f64::max);
-            let loaded = friction[*joint].at_load(0.5 * of.limits.joint_torque_nm[*joint]);
+            let limit_nm = of.limits.joint_torque_nm[*joint];
+            let loaded = friction[*joint].at_load(0.5 * limit_nm);
+            let reversal_nm = REVERSAL_MARGIN * loaded.breakaway_nm;
             thresholds[*joint] =
-                Some(RESIDUAL_MARGIN * peak_nm + REVERSAL_MARGIN * loaded.breakaway_nm);
+                Some(RESIDUAL_MARGIN * peak_nm + reversal_nm + LIMIT_SHARE * limit_nm);
         }
         thresholds
     }

@@ -88,7 +88,7 @@ impl<const N: usize> Fit<N> {
         for (row, (joint, measured)) in joints.iter().zip(self.columns.moving()).enumerate() {
             // Add the torque of known rotors, which the rows do not include.
             let known = motion.tau.column(*measured) - &joint.b;
-            predicted.set_column(row, &(&joint.a * &self.x + known));
+            predicted.set_column(row, &(joint.predicted(&self.x) + known));
         }
         Ok(predicted)
     }

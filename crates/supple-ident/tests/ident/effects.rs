@@ -293,6 +293,13 @@ fn friction_that_grows_with_the_motors_torque_is_found() {
         );
         assert_eq!(friction.load_torque, LoadTorque::Motor);
     }
+    // A prediction knows the motion alone: measured torques do not change it.
+    let mut other = motions[0].clone();
+    other.tau.iter_mut().for_each(|nm| *nm = 3.0 - *nm);
+    let predicted = found.predict_motion(&motions[0]).unwrap();
+    assert!((found.predict_motion(&other).unwrap() - &predicted).amax() < 1e-9);
+    let residual = found.validate_motion(&motions[0]).unwrap();
+    assert!(residual.total_relative < 0.01, "{residual:?}");
     // The controller takes the load of gravity alone; this motion is fast.
     let without = fit(&config.arm, &motions, &ALL, &base).unwrap();
     let without = without.description(&nominal, None).unwrap();
