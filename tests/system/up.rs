@@ -236,23 +236,42 @@ fn a_piped_run_says_what_the_arm_does() {
     assert!(!text.contains("Shift-Activate"), "{text}");
 }
 
-/// The emergency stop is named with the way out of it. Without power the arm falls and loses its positions: the home pose that held
-/// at the start is not taken for the present one.
+/// The emergency stop is named with the way out of it, and that way works. Without power the arm falls and loses its positions: the
+/// home pose that held at the start is not taken for the present one, but must be confirmed.
 #[test]
 fn an_emergency_stop_is_named_and_the_home_pose_is_not_assumed_again() {
-    let mut up = Up::tracking(&["--plant", "emu"]);
+    let up = Up::tracking(&["--plant", "emu"]);
     let press = |arguments: &[&str]| {
         let output = up.run(arguments);
         assert!(output.status.success(), "{}", stderr_of(&output));
     };
     press(&["pendant", "e-stop"]);
     up.wait_until("no power", |status| status["drives"] == "off");
+    // Nobody waits for it while there is no power.
+    assert_eq!(up.run(&["at-home", "--yes"]).status.code(), Some(11));
     press(&["pendant", "release"]);
     press(&["pendant", "idle"]);
-    let output = up.ended();
-    let text = stderr_of(&output);
-    assert!(!output.status.success(), "{text}");
+    press(&["pendant", "cradle"]);
+    assert_eq!(
+        up.run(&["at-home"]).status.code(),
+        Some(11),
+        "not confirmed"
+    );
+    // The pucks wake first.
+    let confirmed = (0..20).any(|_| up.run(&["at-home", "--yes"]).status.success());
+    assert!(confirmed);
+    up.wait_until("power", |status| status["drives"] == "idle");
+    press(&["reset"]);
+    press(&["mode", "gravity-hold"]);
+    press(&["pendant", "activate"]);
+    up.wait_until("torque", |status| status["drives"] == "active");
+    press(&["track", "sinusoid"]);
+    up.wait_until("tracking", |status| status["mode"] == "track");
+    let text = stderr_of(&up.end());
     assert!(text.contains("emergency stop"), "{text}");
-    assert!(text.contains("supple pendant release"), "{text}");
-    assert!(text.contains("put it into its home pose"), "{text}");
+    assert!(
+        text.contains("supple pendant cradle`, `supple at-home`"),
+        "{text}"
+    );
+    assert!(text.contains("has lost its positions"), "{text}");
 }

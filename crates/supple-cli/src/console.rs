@@ -2,7 +2,7 @@
 
 use crate::exit::Failure;
 use serde::Serialize;
-use std::io::{ErrorKind, Write};
+use std::io::{BufRead, ErrorKind, IsTerminal, Write};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use supple_realtime::diagnostics;
@@ -57,6 +57,17 @@ fn flush() {
 /// Writes a line to standard error. Errors are ignored: they cannot be reported anywhere else.
 pub fn print_status(text: &str) {
     print_status_part(format!("{text}\n"));
+}
+
+/// Asks a question on the terminal; false without one, or for any answer but `y` and `yes`.
+pub fn confirms(question: &str) -> bool {
+    if !std::io::stdin().is_terminal() {
+        return false;
+    }
+    print_status_part(format!("{question} [y/N] "));
+    let mut answer = String::new();
+    let read = std::io::stdin().lock().read_line(&mut answer);
+    read.is_ok() && matches!(answer.trim(), "y" | "Y" | "yes")
 }
 
 /// As [`print_status`], for text that is not a complete line.

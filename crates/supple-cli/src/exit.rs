@@ -152,6 +152,17 @@ pub enum Failure {
         /// Error of the operating system, or the reply.
         cause: String,
     },
+    /// Nobody waits for `supple at-home`.
+    #[error(
+        "no arm waits for this: it is needed after an emergency stop alone, once the power is back (release the button, press \
+         Shift-Idle)"
+    )]
+    NoArmWaits,
+    /// The home pose was not confirmed.
+    #[error(
+        "the home pose was not confirmed: nothing was changed; on a terminal answer y, elsewhere give --yes"
+    )]
+    NotConfirmed,
     /// Virtual time was requested for a real CAN bus.
     #[error("--virtual-time is not possible with a CAN interface: omit it, or use --plant emu")]
     VirtualTimeOnRealBus,
@@ -519,6 +530,7 @@ impl Failure {
             | Failure::ProcessEnded { .. }
             | Failure::ControllerHangs { .. }
             | Failure::NotRunning { .. } => 10,
+            Failure::NoArmWaits | Failure::NotConfirmed => 11,
             Failure::Refused { .. } | Failure::NothingLearned | Failure::ArmIsLaidDown => 11,
             Failure::Points(error) => match **error {
                 PointsError::File { .. } => 6,
@@ -771,6 +783,8 @@ mod tests {
             (Failure::Motors { problem: text() }, system),
             (Failure::Refused { reason: text() }, "refused a request"),
             (Failure::ArmIsLaidDown, "refused a request"),
+            (Failure::NoArmWaits, "refused a request"),
+            (Failure::NotConfirmed, "refused a request"),
             (Failure::DidNotReachTracking, "supple drill"),
             (Failure::Drill { rows: text() }, "supple drill"),
             (

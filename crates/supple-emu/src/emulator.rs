@@ -30,6 +30,8 @@ pub enum ArmEvent {
     Safety(SafetyMode, crate::safety::Cause),
     /// A motor puck entered this mode.
     Motor(usize, MotorMode),
+    /// A person put the arm back into the cradle.
+    PutIntoCradle,
     /// The host sent a frame while the transceiver of a waking puck was resetting, and went bus-off.
     HostSentDuringWakeUp,
 }
@@ -61,8 +63,9 @@ pub struct Emulator<const N: usize> {
     /// Button presses scheduled relative to the host's first torque, with their delay after it \[ns\].
     after_first_torque: Vec<(u64, ButtonPress)>,
     powered: bool,
-    /// A cradle still holds the arm in its start pose: until the motors first enter torque mode.
+    /// A cradle holds the arm in its start pose: until the motors next enter torque mode.
     in_cradle: bool,
+    start_rad: Vector<N>,
 }
 
 impl<const N: usize> Emulator<N> {
@@ -152,6 +155,7 @@ impl<const N: usize> Emulator<N> {
             after_first_torque: Vec::new(),
             powered: false,
             in_cradle: config.cradle,
+            start_rad,
             config,
         };
         for puck in &mut emulator.pucks {
@@ -191,6 +195,28 @@ impl<const N: usize> Emulator<N> {
     /// Number of injected faults that have started.
     pub fn injections_begun(&self) -> usize {
         self.injector.begun()
+    }
+
+    /// Puts the arm back into the cradle in its start pose, as a person does; false, and nothing moves, while a motor
+    /// follows torque commands or a fault of the plant is injected.
+    pub fn put_into_cradle(&mut self) -> bool {
+        let torque = self
+            .pucks
+            .iter()
+            .any(|puck| puck.mode() == MotorMode::Torque);
+        let placed = !torque
+            && self.injector.begun() == 0
+            && self
+                .plant
+                .set_state(self.start_rad, Vector::zeros())
+                .is_ok();
+        if placed {
+            self.injector = Injector::none(&self.plant);
+            self.update_motor_angles();
+            self.in_cradle = true;
+            self.record(ArmEvent::PutIntoCradle);
+        }
+        placed
     }
 
     /// Presses a button of the pendant.

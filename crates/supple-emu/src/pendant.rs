@@ -121,6 +121,11 @@ pub fn answer<const N: usize>(emulator: &mut Emulator<N>, line: &str) -> String 
     }
     match line {
         "status" => json(&status(emulator)),
+        "cradle" if emulator.put_into_cradle() => json(&status(emulator)),
+        "cradle" => json(&ErrorReply {
+            error: "the arm moves by its motors, or a fault is injected: press idle first"
+                .to_owned(),
+        }),
         "record" => {
             let arm_events = emulator.events_in_monotonic_time();
             let entries = arm_events.map(|(time_ns, arm_event)| Entry {
@@ -133,7 +138,9 @@ pub fn answer<const N: usize>(emulator: &mut Emulator<N>, line: &str) -> String 
             json(&entries.collect::<Vec<_>>())
         }
         other => json(&ErrorReply {
-            error: format!("`{other}`: expected idle, activate, e-stop, release, status or record"),
+            error: format!(
+                "`{other}`: expected idle, activate, e-stop, release, cradle, status or record"
+            ),
         }),
     }
 }

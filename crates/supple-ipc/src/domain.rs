@@ -98,6 +98,12 @@ impl Domain {
         self.folder.join(format!("learned-{}", self.prefix))
     }
 
+    /// File with which the operator confirms that the arm is in its home pose, after it has lost its positions; the
+    /// process that drives the arm removes it.
+    pub fn home_confirmation(&self) -> PathBuf {
+        self.folder.join(format!("at-home-{}", self.prefix))
+    }
+
     pub(crate) fn config(&self) -> &Config {
         &self.config
     }

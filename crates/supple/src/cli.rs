@@ -73,6 +73,8 @@ pub enum Command {
         #[command(flatten)]
         system: SystemArgs,
     },
+    /// Confirm that the arm is in its home pose: after an emergency stop a WAM has lost its positions, and waits for this.
+    AtHome(AtHomeArgs),
     /// List the motors of an arm on their bus, compare them with the arm's file and, asked explicitly, set registers; for
     /// arms of Damiao motors.
     #[command(after_help = CODES)]
@@ -251,6 +253,17 @@ pub struct DrillArgs {
     pub json: bool,
 }
 
+/// Arguments of `at-home`.
+#[derive(Clone, Debug, Args)]
+pub struct AtHomeArgs {
+    /// Do not ask.
+    #[arg(long)]
+    pub yes: bool,
+    /// System to use.
+    #[command(flatten)]
+    pub system: SystemArgs,
+}
+
 /// Buttons and queries of the pendant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum PendantAction {
@@ -262,6 +275,8 @@ pub enum PendantAction {
     EStop,
     /// Release the emergency stop; `idle` restores the power.
     Release,
+    /// Put the arm back into the cradle in its home pose, as a person does with an arm that fell; only without torque.
+    Cradle,
     /// Show the state of the arm.
     Status,
     /// List the events of the arm since it started.
@@ -573,6 +588,7 @@ impl Command {
             | Command::Play(PlayArgs { system, .. })
             | Command::Probe { system, .. }
             | Command::Pendant { system, .. }
+            | Command::AtHome(AtHomeArgs { system, .. })
             | Command::Status(system)
             | Command::Reset(system)
             | Command::Stop(system) => system.json,

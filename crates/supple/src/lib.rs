@@ -70,6 +70,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
             system,
         } => operate::probe(&urdf.name(arm), *strict, system),
         Command::Pendant { action, system } => operate::pendant(*action, system.prefix.as_deref()),
+        Command::AtHome(args) => operate::at_home(args),
         Command::Reset(system) => operate::reset(system),
         Command::Stop(system) => operate::stop(system),
         Command::Offline(OfflineCommand::Log(LogCommand::Data(command))) => log::run(command),

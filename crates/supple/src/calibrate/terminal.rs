@@ -1,8 +1,7 @@
 //! The person at the terminal: progress, and the question before the arm moves.
 
-use std::io::{BufRead, IsTerminal};
 use std::path::Path;
-use supple_cli::console::{print_status, print_status_part};
+use supple_cli::console::{confirms, print_status};
 use supple_experiment::procedure::{Operator, Sweep};
 
 /// Standard error for progress, standard input for the answer.
@@ -24,15 +23,9 @@ impl Operator for Terminal {
         if self.yes {
             return true;
         }
-        if !std::io::stdin().is_terminal() {
-            return false;
-        }
-        print_status_part(format!(
-            "is the space of {} free, and the emergency stop within reach? [y/N] ",
+        confirms(&format!(
+            "is the space of {} free, and the emergency stop within reach?",
             drawing.display()
-        ));
-        let mut answer = String::new();
-        let read = std::io::stdin().lock().read_line(&mut answer);
-        read.is_ok() && matches!(answer.trim(), "y" | "Y" | "yes")
+        ))
     }
 }

@@ -4,6 +4,7 @@
 
 mod approach;
 mod ask;
+mod at_home;
 mod learning;
 pub mod pendant;
 mod session;
@@ -15,6 +16,7 @@ use ask::{
 };
 
 pub use approach::Approach;
+pub use at_home::at_home;
 pub use learning::learning;
 pub use pendant::{Pendant, pendant};
 pub use session::OperatorSession;

@@ -136,6 +136,7 @@ pub fn pendant(action: PendantAction, prefix: Option<&str>) -> Result<(), Failur
         PendantAction::Activate => "activate",
         PendantAction::EStop => "e-stop",
         PendantAction::Release => "release",
+        PendantAction::Cradle => "cradle",
         PendantAction::Status => "status",
         PendantAction::Record => "record",
     };

@@ -186,11 +186,11 @@ impl StartUp {
             return Some(match self.pendant {
                 Some(_) => {
                     "emergency stop: the motors have no power. To go on: `supple pendant release`, `supple pendant idle`, \
-                     `supple reset` after a fault, `supple mode gravity-hold`, `supple pendant activate`"
+                     `supple pendant cradle`, `supple at-home`, `supple reset` after a fault, `supple mode gravity-hold`, `supple pendant activate`"
                 }
                 None => {
-                    "emergency stop: the motors have no power. To go on: release the button, press Shift-Idle, \
-                     `supple reset` after a fault, `supple mode gravity-hold`, then press Shift-Activate"
+                    "emergency stop: the motors have no power. To go on: release the button, press Shift-Idle, put the arm into its \
+                     home pose, `supple at-home`, `supple reset` after a fault, `supple mode gravity-hold`, then press Shift-Activate"
                 }
             });
         }

@@ -6,6 +6,8 @@ use super::error::CanError;
 use super::start_up::{Progress, StartupConfig, start_up};
 use crate::cycles::{Ended, SEARCH_INTERVAL, open, run_until_shutdown, sum_counters};
 use crate::options::{Options, print_budget};
+use std::path::Path;
+use std::time::SystemTime;
 use supple_bus::{Address, BusError};
 use supple_drive::{Counters, CycleConfig, SharedMemoryLink};
 use supple_ipc::{Domain, PlantLink};
@@ -87,6 +89,15 @@ fn run_joints<const N: usize>(
                 pause(SEARCH_INTERVAL);
                 continue;
             }
+            Err(CanError::NotZeroed { home, .. }) if !first && !stop.shutdown_requested() => {
+                diagnostics::post(format_args!(
+                    "supple-can: the arm has lost its positions: put it into its home pose {home} rad, then confirm it with \
+                     `supple at-home`"
+                ));
+                let confirmed = wait_for_confirmation(&domain.home_confirmation(), &stop_requested);
+                startup_config.zero_at_rad = confirmed.then_some(home_rad);
+                continue;
+            }
             Err(error) => return Err(error),
         };
         if first {
@@ -111,6 +122,20 @@ fn run_joints<const N: usize>(
             "supple-can: the arm does not reply any more: searching for it"
         ));
     }
+}
+
+/// Waits until the operator confirms that the arm is in its home pose; false if a shutdown is requested first. An older
+/// confirmation does not count.
+fn wait_for_confirmation(file: &Path, stop_requested: &dyn Fn() -> bool) -> bool {
+    let since = SystemTime::now();
+    while !stop_requested() {
+        let written = std::fs::metadata(file).and_then(|found| found.modified());
+        if written.is_ok_and(|written| written >= since) && std::fs::remove_file(file).is_ok() {
+            return true;
+        }
+        pause(SEARCH_INTERVAL);
+    }
+    false
 }
 
 fn report_progress(progress: Progress) {
