@@ -173,7 +173,7 @@ fn series_for_python<const N: usize>(designed: &ExcitationDesign<N>, rate_hz: f6
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct ExciteOptions {
-    encoder_noise_rad: f64,
+    encoder_noise_rad: Option<f64>,
     load: bool,
     seed: u64,
     log_dir: Option<PathBuf>,

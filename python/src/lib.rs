@@ -53,7 +53,7 @@ mod _native {
     #[pymodule_export]
     use super::log::read_log;
     #[pymodule_export]
-    use super::plant_options::plant_options;
+    use super::plant_options::{plant_options, realistic_set};
     #[pymodule_export]
     use super::simulate::simulate;
     #[pymodule_export]

@@ -3,7 +3,8 @@
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use supple_ident::{
-    Cancellation, Effects, FrictionChoice, FrictionColumns, Method, Preparation, Procedure,
+    Cancellation, Effects, FrictionChoice, FrictionColumns, LoadTorque, Method, Preparation,
+    Procedure,
 };
 use supple_model::Description;
 
@@ -35,9 +36,33 @@ struct Shape {
     coulomb: bool,
     offset: bool,
     asymmetry: bool,
-    load: bool,
+    load: Option<String>,
     stribeck_rad_per_s: Option<f64>,
     band_rad_per_s: f64,
+}
+
+impl Shape {
+    fn columns(self) -> PyResult<FrictionColumns> {
+        let load = match self.load.as_deref() {
+            None => None,
+            Some("joint") => Some(LoadTorque::Joint),
+            Some("motor") => Some(LoadTorque::Motor),
+            Some(other) => {
+                return Err(PyValueError::new_err(format!(
+                    "FrictionColumns.load: expected \"joint\", \"motor\" or None, got {other:?}"
+                )));
+            }
+        };
+        Ok(FrictionColumns {
+            viscous: self.viscous,
+            coulomb: self.coulomb,
+            offset: self.offset,
+            asymmetry: self.asymmetry,
+            load,
+            stribeck_rad_per_s: self.stribeck_rad_per_s,
+            band_rad_per_s: self.band_rad_per_s,
+        })
+    }
 }
 
 impl Options {
@@ -54,14 +79,9 @@ impl Options {
                 )));
             }
         };
-        let columns = |shape: Shape| FrictionColumns {
-            viscous: shape.viscous,
-            coulomb: shape.coulomb,
-            offset: shape.offset,
-            asymmetry: shape.asymmetry,
-            load: shape.load.then_some(supple_ident::LoadTorque::Joint),
-            stribeck_rad_per_s: shape.stribeck_rad_per_s,
-            band_rad_per_s: shape.band_rad_per_s,
+        let friction = match self.friction {
+            Some(shape) => FrictionChoice::Columns(shape.columns()?),
+            None => FrictionChoice::Auto,
         };
         Ok(Procedure {
             effects: match self.effects {
@@ -77,9 +97,7 @@ impl Options {
                 torque_delay_s: self.torque_delay_s.unwrap_or(0.0),
             },
             method,
-            friction: self.friction.map_or(FrictionChoice::Auto, |shape| {
-                FrictionChoice::Columns(columns(shape))
-            }),
+            friction,
             rotor: self.rotor,
             rotor_deviation: None,
             slow_rad_per_s: self.slow_rad_per_s,

@@ -1,5 +1,6 @@
 //! Options of the simulated arm beyond its description.
 
+use crate::arm::Arm;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -61,6 +62,12 @@ impl<'py> FromPyObject<'_, 'py> for PlantEffects {
             },
         })
     }
+}
+
+/// The name of the realistic set of `arm`.
+#[pyfunction]
+pub fn realistic_set(arm: PyRef<'_, Arm>) -> &'static str {
+    PlantOptions::realistic_name_of(arm.description())
 }
 
 /// The set of options `name` as a dictionary.

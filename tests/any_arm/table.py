@@ -5,16 +5,17 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-STEPS = ("new", "demo", "up")
+STEPS = ("new", "demo", "up", "identify")
 HEADING = """# Public URDFs, unedited
 
 Written by `tests/any_arm/run.py --all --table`; do not edit. Each URDF is given as it is, with nothing but the link that is
 the tip: `supple new` (5 s of the sinusoid at 5 N/m with a model that is 0.1 % and 3 % off), `supple demo` (the worst of ten
-such models; none of these runs was made smaller or left out) and `supple up --plant sim` in virtual time. Allowed are 15 mm
-RMS, more in proportion for an arm that weighs more than 23 N at the tip.
+such models; none of these runs was made smaller or left out), `supple up --plant sim` in virtual time, and `supple excite design`,
+`excite run` and `identify`: what the model leaves of the torques of a motion that was not fitted. Allowed are 15 mm RMS, more in
+proportion for an arm that weighs more than 23 N at the tip, and 10 % of the torques.
 
-| URDF | tip | `supple new` | `supple demo` | `supple up` | outcome |
-|---|---|---|---|---|---|
+| URDF | tip | `supple new` | `supple demo` | `supple up` | `supple identify` | outcome |
+|---|---|---|---|---|---|---|
 """
 
 
@@ -59,5 +60,5 @@ def write(file: Path, outcomes: list[Outcome]) -> None:
         results = [outcome.found.get(step, "-") for step in STEPS]
         rows.append("| " + " | ".join([urdf, tip.replace(",", ", --"), *results, outcome.verdict()]) + " |")
     passed = sum(outcome.verdict() == "OK" for outcome in outcomes)
-    left_out = "" if any("demo" in outcome.found for outcome in outcomes) else "\nThe demo was left out (`--quick`).\n"
+    left_out = "" if any("demo" in outcome.found for outcome in outcomes) else "\nDemo and identification were left out (`--quick`).\n"
     file.write_text(HEADING + "\n".join(rows) + f"\n\n{passed} of {len(outcomes)} pass.\n{left_out}")

@@ -73,7 +73,11 @@ fn run<const N: usize>(
     let mut config = EmulatorConfig::wam(N);
     config.zeroed = options.zeroed;
     config.force_sensor = !options.no_sensor;
-    let effects = PlantOptions::chosen(options.plant_options.as_deref(), options.realistic)?;
+    let effects = PlantOptions::chosen(
+        description,
+        options.plant_options.as_deref(),
+        options.realistic,
+    )?;
     let mut plant = effects.apply(PlantConfig::<N>::from_description(description)?)?;
     if let Some(face_m) = options.block_m {
         plant.scene = Scene::with_block_at(face_m);

@@ -44,8 +44,9 @@ pub struct Calibration {
     pub seed: u64,
     /// Errors of the starting model.
     pub start: Mismatch,
-    /// Standard deviation of the noise on each motor angle \[rad\].
-    pub encoder_noise_rad: f64,
+    /// Standard deviation of the noise on each motor angle \[rad\]; `None` for
+    /// [`PlantOptions::default_encoder_noise_rad`].
+    pub encoder_noise_rad: Option<f64>,
     /// Whether the plant's friction depends on direction and load; true by default.
     pub load: bool,
     /// Effects of a real arm in the plant; none by default.
@@ -61,7 +62,7 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// Model errors of 5 % in gravity and 30 % in friction, encoder noise of a third of a count, no ripple.
+    /// Model errors of 5 % in gravity and 30 % in friction, the noise of the arm's encoders, no ripple.
     pub fn new(seed: u64) -> Calibration {
         Calibration {
             seed,
@@ -70,7 +71,7 @@ impl Calibration {
                 friction: 0.3,
                 seed,
             },
-            encoder_noise_rad: 5e-4,
+            encoder_noise_rad: None,
             load: true,
             plant: PlantOptions::default(),
             ripple_nm: 0.0,
@@ -130,7 +131,10 @@ pub fn plant_of<const N: usize>(
 ) -> Result<PlantConfig<N>, ExperimentError> {
     let mut plant = PlantConfig::<N>::from_description(description)?;
     plant.seed = calibration.seed;
-    plant.actuators.encoder_noise_rad = Vector::repeat(calibration.encoder_noise_rad);
+    let noise_rad = calibration
+        .encoder_noise_rad
+        .unwrap_or_else(|| PlantOptions::default_encoder_noise_rad(description));
+    plant.actuators.encoder_noise_rad = Vector::repeat(noise_rad);
     if !calibration.load {
         plant.friction = plant.friction.map(LuGre::without_load);
     }

@@ -337,6 +337,11 @@ impl Description {
         &self.motors
     }
 
+    /// Whether the TOML describes the motors, in `[motors]`.
+    pub fn describes_motors(&self) -> bool {
+        self.settings.motors.is_some()
+    }
+
     /// Place and size of the paper's trajectories: those of the TOML, or as in the paper.
     pub fn paths(&self) -> Paths {
         self.settings.paths.map_or(Paths::PAPER, Paths::from)

@@ -17,7 +17,7 @@ use supple_plant::PlantOptions;
 /// # Errors
 /// [`Failure`]; [`Failure::Fault`] after all results are written.
 pub fn run(args: &DemoArgs) -> Result<(), Failure> {
-    let summary = perform(args, args.plant.options()?)?;
+    let summary = perform(args, None)?;
     if args.json {
         print_line(&json(&summary)?)?;
     } else {
@@ -64,8 +64,9 @@ pub fn finish(args: &DemoArgs, summary: &Summary) -> Result<(), Failure> {
 ///
 /// # Errors
 /// [`Failure`].
-pub fn perform(args: &DemoArgs, plant: PlantOptions) -> Result<Summary, Failure> {
+pub fn perform(args: &DemoArgs, plant: Option<PlantOptions>) -> Result<Summary, Failure> {
     let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
+    let plant = plant.map_or_else(|| args.plant.options(&arm), Ok)?;
     let model = args
         .model
         .as_ref()

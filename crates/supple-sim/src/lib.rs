@@ -74,7 +74,11 @@ pub fn run<const N: usize>(
     options: &Options,
     stop: &Stop,
 ) -> Result<Summary, SimError> {
-    let effects = PlantOptions::chosen(options.plant_options.as_deref(), options.realistic)?;
+    let effects = PlantOptions::chosen(
+        description,
+        options.plant_options.as_deref(),
+        options.realistic,
+    )?;
     let mut config = effects.apply(PlantConfig::<N>::from_description(description)?)?;
     if let Some(face_m) = options.block_m {
         config.scene = Scene::with_block_at(face_m);

@@ -151,7 +151,7 @@ def excite(
     excitation: Excitation,
     *,
     model: _native.Arm | None = None,
-    encoder_noise_rad: float = 5e-4,
+    encoder_noise_rad: float | None = None,
     load: bool = False,
     seed: int = 0,
     log_dir: str | os.PathLike[str] | None = None,
@@ -168,8 +168,9 @@ def excite(
         The trajectory to track.
     model : Arm, optional
         The controller's model of the arm. Default: ``arm``.
-    encoder_noise_rad : float
-        Standard deviation of the encoder noise, in addition to quantisation (rad).
+    encoder_noise_rad : float, optional
+        Standard deviation of the encoder noise at the motor, in addition to quantisation (rad). Default: that of the
+        arm's realistic set, see :func:`plant_options`.
     load : bool
         Whether the plant's friction depends on direction and load.
     seed : int
@@ -180,7 +181,7 @@ def excite(
         Effects of a real arm in the plant: sizes by name, as :func:`plant_options` returns them, or a TOML file. Default:
         none.
     realistic : bool
-        The same as ``plant_options=supple.plant_options("realistic")``.
+        All effects of a real arm, each of modest size: the realistic set of the arm, see :func:`plant_options`.
 
     Returns
     -------
@@ -201,7 +202,8 @@ def excite(
     >>> recording.q.shape == recording.tau.shape
     True
     """
-    encoder_noise_rad = number("encoder_noise_rad", encoder_noise_rad)
+    if encoder_noise_rad is not None:
+        encoder_noise_rad = number("encoder_noise_rad", encoder_noise_rad)
     seed = integer("seed", seed)
     load = flag("load", load)
     if excitation.q.shape[1] != arm.dof:
@@ -217,7 +219,7 @@ def excite(
             "load": load,
             "seed": seed,
             "log_dir": None if log_dir is None else os.fspath(log_dir),
-            "plant_options": _chosen(plant_options, realistic),
+            "plant_options": _chosen(arm, plant_options, realistic),
         },
     )
     return Recording(torque_delay_s=1.5 * found.pop("period_s"), **found)

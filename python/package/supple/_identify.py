@@ -34,9 +34,10 @@ class FrictionColumns:
     """Constant torque: Coulomb friction may then differ by direction."""
     asymmetry: bool = False
     """``A |qd|``: viscous friction that differs by direction. Needs ``viscous``."""
-    load: bool = False
-    """``L |g| p(qd / band)``: Coulomb friction that grows with the torque ``g`` which the joint's gear
-    transmits to the links, computed with the nominal arm. Needs ``coulomb``."""
+    load: Literal["joint", "motor"] | None = None
+    """``L |g| p(qd / band)``: Coulomb friction that grows with a torque ``g``: ``"joint"``, what the joint's
+    gear transmits to the links, computed with the nominal arm, or ``"motor"``, what the motor applies, friction
+    included. ``None`` if it does not grow. Needs ``coulomb``."""
     stribeck_rad_per_s: float | None = None
     """Stribeck speed (rad/s); ``None`` for no Stribeck effect."""
     band_rad_per_s: float = 0.01
@@ -49,7 +50,8 @@ _FRICTION = {
     "coulomb": FrictionColumns(),
     "offset": FrictionColumns(offset=True),
     "asymmetric": FrictionColumns(offset=True, asymmetry=True),
-    "load": FrictionColumns(load=True),
+    "load": FrictionColumns(load="joint"),
+    "motor-load": FrictionColumns(load="motor"),
     "stribeck": FrictionColumns(offset=True),
 }
 # Default of slow_rad_per_s with friction="stribeck" (rad/s).
@@ -110,11 +112,12 @@ def identify(
     method : {"consistent", "wls", "irls", "ols"}
         Physically consistent weighted least squares; weighted least squares; robust (Huber); ordinary
         least squares.
-    friction : "auto", {"none", "viscous", "coulomb", "offset", "asymmetric", "load", "stribeck"} or FrictionColumns
-        Friction columns of every moving joint. ``"auto"`` chooses by cross-validation. ``"load"``:
-        viscous and Coulomb friction that grows with the load of the joint. ``"stribeck"``: viscous and
-        Coulomb friction with offset, and a Stribeck effect whose parameters are fitted to slow motion in
-        a second stage.
+    friction : str or FrictionColumns
+        Friction columns of every moving joint: ``"auto"``, ``"none"``, ``"viscous"``, ``"coulomb"``,
+        ``"offset"``, ``"asymmetric"``, ``"load"``, ``"motor-load"`` or ``"stribeck"``. ``"auto"`` chooses by
+        cross-validation. ``"load"``, ``"motor-load"``: viscous and Coulomb friction that grows with the load
+        of the joint, or with the torque of its motor. ``"stribeck"``: viscous and Coulomb friction with
+        offset, and a Stribeck effect whose parameters are fitted to slow motion in a second stage.
     rate_hz : float, optional
         Rate of the regular grid to which the log is resampled (Hz). Default: the log's own mean rate.
     keep_every : int

@@ -228,7 +228,7 @@ def simulated(
         "friction_error": friction_error,
         "block": block,
         "seed": seed,
-        "plant_options": _chosen(plant_options, realistic),
+        "plant_options": _chosen(arm, plant_options, realistic),
     }
     return System(_native.Simulation(arm, model, options))
 

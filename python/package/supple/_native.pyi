@@ -24,6 +24,7 @@ __all__ = [
     "learn",
     "payload",
     "plant_options",
+    "realistic_set",
     "read_log",
     "ripple",
     "simulate",
@@ -854,6 +855,9 @@ class Fit:
 
 def read_log(path: str) -> dict[str, Any]:
     """Reads a log: the arm, its metadata and its columns."""
+
+def realistic_set(arm: Arm) -> str:
+    """The name of the realistic set of `arm`."""
 
 def plant_options(name: str) -> dict[str, float]:
     """The set of options `name` as a dictionary."""

@@ -19,8 +19,9 @@ def plant_options(name: str = "realistic") -> dict[str, float]:
 
     Parameters
     ----------
-    name : {"realistic"}
-        All effects together, each of modest size.
+    name : {"realistic", "openarm-realistic", "urdf-realistic"}
+        All effects together, each of modest size: of motors with cables, of motors with gears on a bus, or of
+        motors that are not described, as of a URDF alone.
 
     Returns
     -------
@@ -42,11 +43,13 @@ def plant_options(name: str = "realistic") -> dict[str, float]:
     return _native.plant_options(name)
 
 
-def _chosen(options: PlantOptions | None, realistic: bool) -> dict[str, float] | str | None:
+def _chosen(
+    arm: _native.Arm, options: PlantOptions | None, realistic: bool
+) -> dict[str, float] | str | None:
     if options is not None and realistic:
         raise ValueError("realistic: expected False if plant_options is given")
     if realistic:
-        return plant_options()
+        return plant_options(_native.realistic_set(arm))
     if options is None or isinstance(options, Mapping):
         return None if options is None else dict(options)
     return os.fspath(options)

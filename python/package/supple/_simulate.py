@@ -122,7 +122,7 @@ def simulate(
         Effects of a real arm in the plant: sizes by name, as :func:`plant_options` returns them, or a TOML file. Default:
         none.
     realistic : bool
-        The same as ``plant_options=supple.plant_options("realistic")``.
+        All effects of a real arm, each of modest size: the realistic set of the arm, see :func:`plant_options`.
 
     Returns
     -------
@@ -178,7 +178,7 @@ def simulate(
             "learning": learning,
             "seed": seed,
             "log_dir": None if log_dir is None else os.fspath(log_dir),
-            "plant_options": _chosen(plant_options, realistic),
+            "plant_options": _chosen(arm, plant_options, realistic),
         },
     )
     cycles = result["cycles"]

@@ -57,7 +57,11 @@ pub(crate) fn run<const N: usize>(
     let bus = description.bus().ok_or(missing("[bus]"))?;
     let mut config = DamiaoConfig::expected(bus);
     config.allow_flash = options.allow_flash;
-    let effects = PlantOptions::chosen(options.plant_options.as_deref(), options.realistic)?;
+    let effects = PlantOptions::chosen(
+        description,
+        options.plant_options.as_deref(),
+        options.realistic,
+    )?;
     let mut plant = effects.apply(PlantConfig::<N>::from_description(description)?)?;
     if let Some(face_m) = options.block_m {
         plant.scene = Scene::with_block_at(face_m);

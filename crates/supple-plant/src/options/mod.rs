@@ -34,6 +34,9 @@ pub const REALISTIC: &str = include_str!("../../../../assets/plants/realistic.to
 pub const OPENARM_REALISTIC: &str =
     include_str!("../../../../assets/plants/openarm-realistic.toml");
 
+/// TOML of the set `urdf-realistic`.
+pub const URDF_REALISTIC: &str = include_str!("../../../../assets/plants/urdf-realistic.toml");
+
 /// Name of the set `realistic`, and of its file in messages.
 const REALISTIC_NAME: &str = "assets/plants/realistic.toml";
 
@@ -41,7 +44,7 @@ const REALISTIC_NAME: &str = "assets/plants/realistic.toml";
 const MAX_BYTES: u64 = 1 << 16;
 
 /// Names of the built-in sets.
-pub const SETS: [&str; 2] = ["realistic", "openarm-realistic"];
+pub const SETS: [&str; 3] = ["realistic", "openarm-realistic", "urdf-realistic"];
 
 /// Error of a file of plant options.
 #[derive(Debug, thiserror::Error)]
@@ -132,14 +135,28 @@ impl PlantOptions {
         Self::from_toml(REALISTIC, REALISTIC_NAME).expect("the built-in set is valid")
     }
 
-    /// The set of an arm: `openarm-realistic` for geared motors on a bus (`[bus]`), else `realistic`.
-    pub fn realistic_of(arm: &Description) -> PlantOptions {
-        match arm.bus() {
-            Some(_) => {
-                Self::from_toml(OPENARM_REALISTIC, SETS[1]).expect("the built-in set is valid")
-            }
-            None => Self::realistic(),
+    /// Name of the realistic set of an arm: `openarm-realistic` for geared motors on a bus (`[bus]`), `realistic` for motors
+    /// that the TOML describes (`[motors]`), else `urdf-realistic`.
+    pub fn realistic_name_of(arm: &Description) -> &'static str {
+        match (arm.bus(), arm.describes_motors()) {
+            (Some(_), _) => SETS[1],
+            (None, true) => SETS[0],
+            (None, false) => SETS[2],
         }
+    }
+
+    /// The set that [`PlantOptions::realistic_name_of`] names.
+    pub fn realistic_of(arm: &Description) -> PlantOptions {
+        let name = Self::realistic_name_of(arm);
+        let read = Self::set(name).and_then(|toml| Self::from_toml(toml, name));
+        read.expect("the built-in sets are valid")
+    }
+
+    /// Noise of the arm's encoders where none is given, as in [`PlantOptions::realistic_of`]: standard deviation at
+    /// the motor \[rad\].
+    pub fn default_encoder_noise_rad(arm: &Description) -> f64 {
+        let noise_rad = Self::realistic_of(arm).encoder_noise_rad;
+        noise_rad.expect("each built-in set has it")
     }
 
     /// The TOML of a built-in set.
@@ -150,6 +167,7 @@ impl PlantOptions {
         match name {
             "realistic" => Ok(REALISTIC),
             "openarm-realistic" => Ok(OPENARM_REALISTIC),
+            "urdf-realistic" => Ok(URDF_REALISTIC),
             _ => Err(PlantOptionsError::UnknownSet {
                 name: name.to_owned(),
                 known: SETS.join(", "),
@@ -157,12 +175,16 @@ impl PlantOptions {
         }
     }
 
-    /// The options of a command line: a file or a built-in set by its name, the set `realistic`, or none. A name takes
-    /// precedence; write `./realistic` for a file.
+    /// The options of a command line for `arm`: a file or a built-in set by its name, the realistic set of the arm
+    /// ([`PlantOptions::realistic_of`]), or none. A name takes precedence; write `./realistic` for a file.
     ///
     /// # Errors
     /// As [`PlantOptions::from_file`].
-    pub fn chosen(file: Option<&Path>, realistic: bool) -> Result<PlantOptions, PlantOptionsError> {
+    pub fn chosen(
+        arm: &Description,
+        file: Option<&Path>,
+        realistic: bool,
+    ) -> Result<PlantOptions, PlantOptionsError> {
         let named = file
             .and_then(Path::to_str)
             .filter(|name| SETS.contains(name));
@@ -171,7 +193,7 @@ impl PlantOptions {
         }
         match (file, realistic) {
             (Some(file), _) => Self::from_file(file),
-            (None, true) => Ok(Self::realistic()),
+            (None, true) => Ok(Self::realistic_of(arm)),
             (None, false) => Ok(Self::default()),
         }
     }

@@ -1,8 +1,9 @@
 //! Options of the plant: files, ranges, seeds, determinism.
 
 use crate::common::{wam4, wam4_at};
+use std::path::Path;
 use supple_core::{Friction, Vector};
-use supple_model::Description;
+use supple_model::{Description, UrdfName};
 use supple_plant::options::{OPTIONS, REALISTIC};
 use supple_plant::{ActuatorModel, LuGre, Plant, PlantConfig, PlantOptions};
 
@@ -77,7 +78,8 @@ fn the_realistic_set_is_valid_and_has_all_effects_of_an_arm_with_cables() {
 #[test]
 fn the_set_of_geared_motors_has_what_users_report() {
     let name = std::path::Path::new("openarm-realistic");
-    let geared = PlantOptions::chosen(Some(name), false).unwrap();
+    let arm = Description::asset("wam4").unwrap();
+    let geared = PlantOptions::chosen(&arm, Some(name), false).unwrap();
     let config = geared.apply(config(3)).unwrap();
     for k in config.actuators.torque_constant.iter() {
         assert!((1.0 / 1.5..=1.0 / 1.29).contains(k), "{k}");
@@ -92,6 +94,29 @@ fn the_set_of_geared_motors_has_what_users_report() {
             .iter()
             .all(|d| d.abs() == 0.1)
     );
+}
+
+/// The motors of an arm decide: those of a URDF are unknown, and its encoders measure at the joints.
+#[test]
+fn an_arm_has_the_realistic_set_of_its_motors() {
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/wam4/arm.urdf");
+    let urdf_alone = UrdfName::parse(&file.display().to_string()).unwrap();
+    let urdf_alone = Description::from_urdf(&urdf_alone).unwrap();
+    let name = PlantOptions::realistic_name_of;
+    let asset = |name| Description::asset(name).unwrap();
+    assert_eq!(name(&asset("wam4")), "realistic");
+    assert_eq!(name(&asset("openarm")), "openarm-realistic");
+    assert_eq!(name(&urdf_alone), "urdf-realistic");
+    for arm in [asset("wam4"), asset("yam"), urdf_alone] {
+        let set = PlantOptions::chosen(&arm, None, true).unwrap();
+        assert_eq!(set, PlantOptions::realistic_of(&arm));
+        let noise_rad = PlantOptions::default_encoder_noise_rad(&arm);
+        assert_eq!(set.encoder_noise_rad, Some(noise_rad));
+        // At the joint: less than a quarter of the count of any encoder of an arm that is controlled by torque.
+        let ratio = arm.motors().motor_from_joint.iter();
+        let ratio = ratio.fold(1.0_f64, |most, ratio| most.max(ratio.abs()));
+        assert!(noise_rad / ratio <= 1e-4, "{noise_rad} {ratio}");
+    }
 }
 
 /// Sizes in N m that a shoulder hardly notices would be a large part of the torque of a wrist's motor.

@@ -31,7 +31,7 @@ pub struct Line {
 pub fn run(args: &BreakawayArgs) -> Result<(), Failure> {
     let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     let joints = joints(&args.joints, arm.dof())?;
-    let effects = args.plant.options()?;
+    let effects = args.plant.options(&arm)?;
     let lines = with_dof!(arm.dof(), N => {
         let calibration = Calibration {
             plant: effects.clone(),

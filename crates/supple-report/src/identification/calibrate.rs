@@ -56,9 +56,9 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
     }
     // The demo is about the arm that was calibrated, with the noise of its encoders; its friction depends on direction and load
     // also after a calibration without.
-    let effects = args.plant.options()?;
+    let effects = args.plant.options(&arm)?;
     let realistic_seeds = u64::from(!effects.is_none());
-    let noise_rad = Calibration::new(args.seed).encoder_noise_rad;
+    let noise_rad = PlantOptions::default_encoder_noise_rad(&arm);
     let encoder_noise_rad = effects.encoder_noise_rad.or(Some(noise_rad));
     let plant = args.out.join(PLANT);
     let demo = DemoArgs {
@@ -79,10 +79,10 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
     };
     let summary = demo::perform(
         &demo,
-        PlantOptions {
+        Some(PlantOptions {
             encoder_noise_rad,
             ..effects
-        },
+        }),
     )?;
     if !args.json {
         demo::print(&summary)?;
@@ -95,7 +95,7 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Resu
     let calibration = Calibration {
         ripple_nm: args.ripple,
         load: !args.no_load_friction,
-        plant: args.plant.options()?,
+        plant: args.plant.options(arm)?,
         breakaway: true,
         log_dir: Some(staging.folder("logs")?),
         ..Calibration::new(args.seed)

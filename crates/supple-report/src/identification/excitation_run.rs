@@ -73,7 +73,7 @@ fn run_with_dof<const N: usize>(
 ) -> Result<(), Failure> {
     let calibration = Calibration {
         load: !args.no_load_friction,
-        plant: args.plant.options()?,
+        plant: args.plant.options(arm)?,
         ripple_nm: args.ripple,
         ..Calibration::new(args.seed)
     };

@@ -6,6 +6,7 @@ use supple_cli::console::{print_json, print_line, print_status};
 use supple_cli::exit::Failure;
 use supple_experiment::paper_procedure::{ARM, PaperProcedure, paper_procedure};
 use supple_experiment::{Calibration, Mismatch};
+use supple_model::Description;
 use supple_model::paper::Parameters;
 
 /// Units of the ten determined combinations, in the order of [`Parameters::BASE_NAMES`].
@@ -62,13 +63,14 @@ struct Summary {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &CalibratePaperArgs) -> Result<(), Failure> {
+    let arm = Description::asset(ARM)?;
     let calibration = Calibration {
         start: Mismatch {
             seed: args.seed,
             ..Calibration::new(args.seed).start
         },
         load: !args.no_load_friction,
-        plant: args.plant.options()?,
+        plant: args.plant.options(&arm)?,
         ..Calibration::new(args.seed)
     };
     let found = paper_procedure(&calibration, args.samples, &mut |step| {

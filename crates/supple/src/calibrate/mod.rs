@@ -66,7 +66,7 @@ fn sized<const N: usize>(
         let calibration = Calibration {
             ripple_nm: args.ripple,
             load: !args.no_load_friction,
-            plant: args.plant.options()?,
+            plant: args.plant.options(arm)?,
             ..Calibration::new(args.seed)
         };
         let plant = plant_of::<N>(arm, &calibration)?;
@@ -80,7 +80,7 @@ fn sized<const N: usize>(
     if args.virtual_time && on != CalibrationPlant::Emu {
         return Err(Failure::VirtualTimeNeedsEmu);
     }
-    let up = up_args(args, on)?;
+    let up = up_args(arm, args, on)?;
     let starts = on != CalibrationPlant::Running;
     let _pidfile = starts.then(|| Pidfile::create(&domain)).transpose()?;
     let mut running = RunningArm::<N>::new(&up, starts, arm, &domain, &args.out, stop)?;
@@ -162,7 +162,11 @@ fn start_model<const N: usize>(
 }
 
 /// The system to start. The emulated arm draws the signs and phases of its effects from the seed.
-fn up_args(args: &CalibrateArgs, on: CalibrationPlant) -> Result<UpArgs, Failure> {
+fn up_args(
+    arm: &Description,
+    args: &CalibrateArgs,
+    on: CalibrationPlant,
+) -> Result<UpArgs, Failure> {
     let bus = args.bus.as_deref().map(Address::from_str).transpose();
     Ok(UpArgs {
         plant: match on {
@@ -181,7 +185,7 @@ fn up_args(args: &CalibrateArgs, on: CalibrationPlant) -> Result<UpArgs, Failure
         block_m: None,
         inject: args.inject.clone(),
         misbehave: Vec::new(),
-        plant_options: seeded(args)?,
+        plant_options: seeded(arm, args)?,
         trace: None,
         rate_hz: None,
         for_s: None,
@@ -197,12 +201,12 @@ fn up_args(args: &CalibrateArgs, on: CalibrationPlant) -> Result<UpArgs, Failure
 }
 
 /// The options of the plant with the seed: a file in the folder of the results.
-fn seeded(args: &CalibrateArgs) -> Result<PlantArgs, Failure> {
-    let options = args.plant.options()?;
+fn seeded(arm: &Description, args: &CalibrateArgs) -> Result<PlantArgs, Failure> {
+    let options = args.plant.options(arm)?;
     let file = args.plant.plant_options.as_deref();
     let named = file.and_then(Path::to_str);
     let set = match args.plant.realistic {
-        true => Some("realistic"),
+        true => Some(PlantOptions::realistic_name_of(arm)),
         false => named.filter(|name| SETS.contains(name)),
     };
     let Some(set) = set.filter(|_| options.seed.is_none()) else {

@@ -91,7 +91,7 @@ impl<const N: usize> RunningArm<N> {
             starts,
             loaded: false,
             virtual_time: args.virtual_time,
-            options: args.plant_options.options()?,
+            options: args.plant_options.options(description)?,
             folder: out.join(MODEL),
             learned: domain.learned_folder(),
             logs: out.join(supple_experiment::procedure::LOGS),

@@ -76,7 +76,7 @@ impl Plan {
         if !args.misbehave.is_empty() && !emulates_motors_on_bus {
             return Err(Failure::MisbehaviourWithoutMotors);
         }
-        args.check_plant_options()?;
+        args.check_plant_options(description)?;
         args.check_bus_options()?;
         let controller = Program {
             name: CONTROLLER,
@@ -270,14 +270,14 @@ impl UpArgs {
     }
 
     /// The simulated arm's options are checked before any process starts.
-    fn check_plant_options(&self) -> Result<(), Failure> {
+    fn check_plant_options(&self, description: &Description) -> Result<(), Failure> {
         let given = !self.plant_options.to_arguments().is_empty()
             || self.block_m.is_some()
             || self.trace.is_some();
         match self.plant {
             PlantKind::Can if given => Err(Failure::OptionsOfRealArm),
             plant => {
-                let hand = self.plant_options.options()?.hand;
+                let hand = self.plant_options.options(description)?.hand;
                 match hand {
                     // An emulated arm does not know the mode, so that a hand cannot grip it in float alone.
                     Some(hand) if plant == PlantKind::Emu && hand.when == Grip::Float => {

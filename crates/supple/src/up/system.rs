@@ -65,7 +65,7 @@ impl<'a, const N: usize> System<'a, N> {
         let limit = args.for_s.map(|for_s| cycles_of(for_s, period_s));
         let (trajectory, duration_s) = trajectory_for(args.track, description);
         let plan = Plan::new(args, description, domain, limit)?;
-        let options = args.plant_options.options()?;
+        let options = args.plant_options.options(description)?;
         let recorder = args
             .log_file()
             .map(|file| Recorder::create(&file, description, &config, args.virtual_time, &options));
