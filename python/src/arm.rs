@@ -1,6 +1,7 @@
 //! The class `Arm`.
 
 use crate::arrays::{self, Argument, Array, Batch};
+use crate::check::{self, Unchecked};
 use crate::complete;
 use crate::dynamics::{Dynamics, Quantity};
 use crate::errors;
@@ -8,7 +9,6 @@ use crate::friction::Friction;
 use crate::law::{self, BatchedLaw, Given};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::OnceLock;
 use supple_model::{Completed, Description, ModelError, with_dof};
@@ -101,6 +101,8 @@ impl Arm {
     ///
     /// Raises
     /// ------
+    /// TypeError
+    ///     For an argument of the wrong type.
     /// ValueError
     ///     If no arm of that name is built in, or the files are invalid.
     /// FileNotFoundError
@@ -119,8 +121,15 @@ impl Arm {
     /// >>> supple.Arm.load("wam7").dof
     /// 7
     #[staticmethod]
-    #[pyo3(signature = (name_or_path, *, strict = false))]
-    fn load(py: Python<'_>, name_or_path: PathBuf, strict: bool) -> PyResult<Self> {
+    #[pyo3(signature = (name_or_path, *, strict = Unchecked::LEFT_OUT),
+        text_signature = "(name_or_path, *, strict=False)")]
+    fn load<'py>(
+        py: Python<'py>,
+        name_or_path: &Bound<'py, PyAny>,
+        strict: Unchecked<'py>,
+    ) -> PyResult<Self> {
+        let name_or_path = check::path("name_or_path", name_or_path)?;
+        let strict = strict.or(false, |given| check::flag("strict", given))?;
         let description = Description::find(&name_or_path.to_string_lossy());
         let description = description.and_then(|found| found.strict_if(strict));
         let description = description.map_err(errors::model)?;
@@ -141,16 +150,22 @@ impl Arm {
     /// armature : array_like, (N,), optional
     ///     Rotor inertia of each joint, reflected to the joint (kg m^2). Default: none.
     /// fixed_joints_rad : mapping of str to float, optional
-    ///     Movable joints that are fixed, each at an angle (rad). Joints that do not carry the tip, such as a
-    ///     gripper's, must be listed.
+    ///     Movable joints that are fixed, each at a position (rad, m for a prismatic joint). Joints that do not carry
+    ///     the tip, such as a gripper's, are fixed without being listed: see the notes.
     /// point_mass_radius_m : float, optional
     ///     Links with mass but zero inertia are modelled as solid balls of this radius (m). Default: they are
     ///     rejected.
+    /// repair : bool
+    ///     Replace an inertia that no rigid body has by the nearest one that a rigid body has, with a warning that names
+    ///     both. Default: such a link between root and tip is rejected.
     /// strict : bool
-    ///     As in :meth:`Arm.load`.
+    ///     As in :meth:`Arm.load`. Joints that are fixed without being listed and inertias that are replaced are rejected
+    ///     too.
     ///
     /// Raises
     /// ------
+    /// TypeError
+    ///     For an argument of the wrong type.
     /// ValueError
     ///     If the model is physically inconsistent, not connected or unsupported; the message names file,
     ///     element, value and remedy.
@@ -162,15 +177,16 @@ impl Arm {
     /// Warns
     /// -----
     /// UserWarning
-    ///     As :meth:`Arm.load`.
+    ///     As :meth:`Arm.load`; for each kind of joint that is fixed without being listed, and for each inertia that is
+    ///     replaced.
     ///
     /// Notes
     /// -----
-    /// Friction is read from the URDF's ``<dynamics>``. A joint that does not carry the tip, one that is prismatic or a
-    /// mimic, and the first ones of more than seven are frozen, each kind with a warning; ``fixed_joints_rad`` gives other
-    /// positions. A joint whose range, effort or velocity the URDF omits or sets to zero is practically unlimited: one turn
-    /// in either direction, 1e5 N m, 100 rad/s. That does for dynamics and identification;
-    /// :func:`design_excitation` needs the true limits too.
+    /// Friction is read from the URDF's ``<dynamics>``. Joints that do not carry the tip, prismatic ones, mimics, and the
+    /// first ones of more than seven are fixed; those that ``fixed_joints_rad`` does not list at zero, or at the end of
+    /// their range that is closest to it, each kind with a warning. A joint whose range, effort or velocity the URDF omits
+    /// or sets to zero is practically unlimited: one turn in either direction, 1e5 N m, 100 rad/s. That does for dynamics
+    /// and identification; :func:`design_excitation` needs the true limits too.
     ///
     /// Dynamics are those of the URDF, with ``armature``. :func:`simulate`, :func:`simulated` and :func:`excite` take the
     /// rest, such as gains, home pose and estimated rotor inertias, from :meth:`completed`. They need the limits of
@@ -182,24 +198,33 @@ impl Arm {
     /// >>> arm = supple.Arm.from_urdf("robot.urdf", tip="tool0").completed()  # doctest: +SKIP
     /// >>> supple.simulate(arm, "sinusoid", stiffness_n_per_m=50.0).rms_error_m  # doctest: +SKIP
     #[staticmethod]
-    #[pyo3(signature = (path, tip = "tip", *, gravity = None, armature = None, fixed_joints_rad = None,
-        point_mass_radius_m = None, strict = false),
+    #[pyo3(signature = (path, tip = Unchecked::LEFT_OUT, *, gravity = None, armature = None, fixed_joints_rad = None,
+        point_mass_radius_m = None, repair = Unchecked::LEFT_OUT, strict = Unchecked::LEFT_OUT),
         text_signature = "(path, tip='tip', *, gravity=(0.0, 0.0, -9.81), armature=None, \
-        fixed_joints_rad=None, point_mass_radius_m=None, strict=False)")]
+        fixed_joints_rad=None, point_mass_radius_m=None, repair=False, strict=False)")]
     #[expect(
         clippy::too_many_arguments,
         reason = "all but the path are keywords in Python"
     )]
-    fn from_urdf(
-        py: Python<'_>,
-        path: PathBuf,
-        tip: &str,
-        gravity: Option<&Bound<'_, PyAny>>,
-        armature: Option<&Bound<'_, PyAny>>,
-        fixed_joints_rad: Option<BTreeMap<String, f64>>,
-        point_mass_radius_m: Option<f64>,
-        strict: bool,
+    fn from_urdf<'py>(
+        py: Python<'py>,
+        path: &Bound<'py, PyAny>,
+        tip: Unchecked<'py>,
+        gravity: Option<&Bound<'py, PyAny>>,
+        armature: Option<&Bound<'py, PyAny>>,
+        fixed_joints_rad: Option<&Bound<'py, PyAny>>,
+        point_mass_radius_m: Option<&Bound<'py, PyAny>>,
+        repair: Unchecked<'py>,
+        strict: Unchecked<'py>,
     ) -> PyResult<Self> {
+        let path = check::path("path", path)?;
+        let tip = tip.or("tip".to_owned(), |given| check::text("tip", given))?;
+        let repair = repair.or(false, |given| check::flag("repair", given))?;
+        let strict = strict.or(false, |given| check::flag("strict", given))?;
+        let fixed = fixed_joints_rad.map(|given| check::named_numbers("fixed_joints_rad", given));
+        let fixed = fixed.transpose()?.unwrap_or_default();
+        let radius_m = point_mass_radius_m.map(|given| check::number("point_mass_radius_m", given));
+        let radius_m = radius_m.transpose()?;
         let urdf = supple_files::read_text(&path, Description::MAX_BYTES).map_err(|cause| {
             let message = format!("{}: cannot be read: {cause}", path.display());
             errors::system(&cause, message)
@@ -218,16 +243,19 @@ impl Arm {
             entry("tip_frame", tip),
             entry("gravity_m_per_s2", gravity),
         ]);
-        if let Some(radius_m) = point_mass_radius_m {
+        if repair {
+            settings.insert("repair_inertia".to_owned(), true.into());
+        }
+        if let Some(radius_m) = radius_m {
             settings.insert("point_mass_radius_m".to_owned(), radius_m.into());
         }
-        let fixed = fixed_joints_rad.into_iter().flatten();
-        let fixed: toml::Table = fixed.map(|(joint, angle)| (joint, angle.into())).collect();
+        let fixed = fixed.into_iter().map(|(joint, at)| (joint, at.into()));
+        let fixed: toml::Table = fixed.collect();
         settings.insert("fixed_joints_rad".to_owned(), fixed.into());
         let read = |settings: &toml::Table| {
             let description = Description::from_text(&settings.to_string(), &urdf);
             let description = description.and_then(|found| found.strict_if(strict));
-            description.map_err(errors::model)
+            description.map_err(|error| errors::model(with_arguments(error)))
         };
         let mut description = read(&settings)?;
         if let Some(armature) = armature {
@@ -865,6 +893,18 @@ impl Arm {
     fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let module = slf.py().import("supple._arm_html")?;
         module.call_method1("arm_table", (slf,))
+    }
+}
+
+/// The error with the remedies that arguments of `from_urdf` are.
+fn with_arguments(error: ModelError) -> ModelError {
+    match error {
+        ModelError::Invalid(mut finding) => {
+            let option = "--repair (repair_inertia = true in the TOML)";
+            finding.remedy = finding.remedy.replace(option, "repair=True");
+            ModelError::Invalid(finding)
+        }
+        error => error,
     }
 }
 

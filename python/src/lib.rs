@@ -8,6 +8,7 @@
 mod arm;
 mod arrays;
 mod base;
+mod check;
 mod complete;
 mod dynamics;
 mod errors;

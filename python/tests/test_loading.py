@@ -115,6 +115,51 @@ def test_dynamics_need_no_joint_limits(tmp_path, limit):
         supple.Arm.from_urdf(path)
 
 
+def test_inertias_that_no_body_has_are_repaired_on_request(tmp_path):
+    path = write_random_urdf(tmp_path, 4, 1)
+    sound = supple.Arm.from_urdf(path, repair=True)
+    assert sound.parameters.tolist() == supple.Arm.from_urdf(path).parameters.tolist()
+    text = path.read_text()
+    begin = text.index("<inertia ", text.index('name="link3"'))
+    # The moments about y and z add up to less than the one about x.
+    wrong = '<inertia ixx="0.1" ixy="0" ixz="0" iyy="0.03" iyz="0" izz="0.02"/>'
+    path.write_text(text[:begin] + wrong + text[text.index("/>", begin) + 2 :])
+    with pytest.raises(ValueError, match=r"link `link3` .*point_mass_radius_m.*repair=True") as raised:
+        supple.Arm.from_urdf(path)
+    assert "--repair" not in str(raised.value) and "TOML" not in str(raised.value)
+    with pytest.warns(UserWarning, match="link `link3` .*0.1") as caught:
+        arm = supple.Arm.from_urdf(path, repair=True)
+    assert len(caught) == 1
+    with pytest.raises(ValueError, match="link `link3`"):
+        supple.Arm.from_urdf(path, repair=True, strict=True)
+    # Mass and centre of mass stay, and the arm has a mass matrix that a body has.
+    np.testing.assert_array_equal(arm.parameters.reshape(4, 10)[:, :4], sound.parameters.reshape(4, 10)[:, :4])
+    poses = np.random.default_rng(0).normal(size=(20, 4))
+    assert (np.linalg.eigvalsh(arm.mass_matrix(poses)) > 0.0).all()
+    # An arm that was pickled needs no repair again.
+    assert pickle.loads(pickle.dumps(arm)) == arm
+
+
+def test_joints_that_do_not_carry_the_tip_need_not_be_listed(tmp_path):
+    path = write_random_urdf(tmp_path, 4, 1)
+    finger = (
+        '<link name="finger"><inertial><origin xyz="0.1 0 0"/><mass value="0.2"/>'
+        '<inertia ixx="1e-3" ixy="0" ixz="0" iyy="1e-3" iyz="0" izz="1e-3"/></inertial></link>'
+        '<joint name="grip" type="revolute"><parent link="link4"/><child link="finger"/><axis xyz="0 0 1"/>'
+        '<limit lower="0.2" upper="1" effort="1" velocity="1"/></joint></robot>'
+    )
+    path.write_text(path.read_text().replace("</robot>", finger))
+    with pytest.warns(UserWarning, match="`grip` at 0.2") as caught:
+        arm = supple.Arm.from_urdf(path)
+    assert len(caught) == 1 and arm.dof == 4
+    # At the end of its range that is closest to zero.
+    q = np.random.default_rng(0).normal(size=(5, 4))
+    np.testing.assert_array_equal(supple.Arm.from_urdf(path, fixed_joints_rad={"grip": 0.2}).gravity(q), arm.gravity(q))
+    assert (supple.Arm.from_urdf(path, fixed_joints_rad={"grip": 0.9}).gravity(q) != arm.gravity(q)).any()
+    with pytest.raises(ValueError, match="`grip`"):
+        supple.Arm.from_urdf(path, strict=True)
+
+
 def test_two_joints_are_too_few(tmp_path):
     with pytest.raises(ValueError, match="an arm of 2 moving joints is not supported"):
         supple.Arm.from_urdf(write_random_urdf(tmp_path, 2, 0))

@@ -46,6 +46,11 @@ def test_the_second_half_is_predicted_from_the_first(log, arm, options):
     assert alone.total_relative > validation.total_relative
 
 
-def test_a_link_without_inertia_needs_a_point_mass_radius():
-    with pytest.raises(ValueError, match=r"link `link_6` .*must be positive.*point_mass_radius_m"):
+def test_a_link_without_inertia_needs_a_point_mass_radius_or_repair():
+    with pytest.raises(ValueError, match=r"link `link_6` .*must be positive.*point_mass_radius_m.*repair=True"):
         supple.Arm.from_urdf(DATA / "tx40.urdf", tip="tool0")
+    with pytest.warns(UserWarning, match="link `link_6`"):
+        repaired = supple.Arm.from_urdf(DATA / "tx40.urdf", tip="tool0", repair=True)
+    # The ball that replaces it has a radius of 20 mm.
+    ball = supple.Arm.from_urdf(DATA / "tx40.urdf", tip="tool0", point_mass_radius_m=0.02)
+    np.testing.assert_allclose(repaired.parameters, ball.parameters, rtol=1e-12, atol=1e-15)

@@ -1,38 +1,144 @@
-"""Arguments of functions: every error names the argument, what it takes and what it got."""
+"""Arguments of functions: every error names the argument, what it takes and what it got.
+
+Of the wrong type is a TypeError, of the wrong value a ValueError. Neither text nor truth values are numbers.
+"""
 
 from __future__ import annotations
 
 import operator
-from math import isfinite
+import os
+import reprlib
+from collections.abc import Callable, Iterable, Mapping
+from math import inf, isfinite
+from typing import ParamSpec, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from supple import _native
+
+P = ParamSpec("P")
+R = TypeVar("R")
+T = TypeVar("T")
+
+_SHORT = reprlib.Repr()
+_SHORT.maxstring = _SHORT.maxother = 60
+_NO_NUMBER = (str, bytes, bytearray, bool, np.bool_)
 
 
-def number(name: str, value: float, *, positive: bool = False) -> float:
-    """A finite number, zero or more, or with ``positive`` more than zero."""
+def wrong(name: str, expected: str, value: object) -> TypeError:
+    """The error of an argument of the wrong type."""
+    # On one line: the text of an array has several.
+    found = " ".join(_SHORT.repr(value).split())
+    return TypeError(f"{name}: expected {expected}, got {found}")
+
+
+def number(name: str, value: float, *, positive: bool = False, signed: bool = False) -> float:
+    """A finite number, zero or more; with ``positive`` more than zero, with ``signed`` any."""
+    if isinstance(value, _NO_NUMBER) or getattr(value, "ndim", 0) != 0:
+        raise wrong(name, "a number", value)
     try:
         found = float(value)
     except (TypeError, ValueError):
-        raise TypeError(f"{name}: expected a number, got {value!r}") from None
-    if not isfinite(found) or found < 0.0 or (positive and found == 0.0):
-        wanted = "finite and positive" if positive else "finite and not negative"
+        raise wrong(name, "a number", value) from None
+    except OverflowError:
+        found = inf
+    if not isfinite(found) or (found < 0.0 and not signed) or (positive and found == 0.0):
+        wanted = "finite" if signed else "finite and positive" if positive else "finite and not negative"
         raise ValueError(f"{name}: expected a number that is {wanted}, got {value}")
     return found
 
 
-def integer(name: str, value: int, *, limit: int = 2**64) -> int:
-    """An integer, zero or more and below ``limit``."""
+def integer(name: str, value: int, *, least: int = 0, limit: int = 2**64) -> int:
+    """An integer, ``least`` or more and below ``limit``."""
+    if isinstance(value, _NO_NUMBER):
+        raise wrong(name, "an integer", value)
     try:
         found = operator.index(value)
     except TypeError:
-        raise TypeError(f"{name}: expected an integer, got {value!r}") from None
-    if found < 0:
-        raise ValueError(f"{name}: expected zero or more, got {found}")
+        raise wrong(name, "an integer", value) from None
+    if found < least:
+        raise ValueError(f"{name}: expected {least or 'zero'} or more, got {found}")
     if found >= limit:
         raise ValueError(f"{name}: expected less than {limit}, got {found}")
     return found
 
 
+def iterable(name: str, values: Iterable[T]) -> Iterable[T]:
+    """Something that can be iterated over."""
+    try:
+        iter(values)
+    except TypeError:
+        raise wrong(name, "an iterable", values) from None
+    return values
+
+
+def integers(name: str, values: Iterable[int]) -> list[int]:
+    """Integers, zero or more each."""
+    if isinstance(values, (str, bytes)):
+        raise wrong(name, "integers", values)
+    return [integer(f"{name}[{i}]", value) for i, value in enumerate(iterable(name, values))]
+
+
+def array(name: str, values: ArrayLike, shape: tuple[int, ...] | None = None) -> NDArray[np.float64]:
+    """Numbers as an array, with ``shape`` of this one."""
+    try:
+        found = np.asarray(values)
+    except ValueError as error:
+        raise ValueError(f"{name}: expected numbers, got lists of different lengths") from error
+    if found.dtype.kind not in "iuf":
+        raise wrong(name, "numbers", values)
+    if shape is not None and found.shape != shape:
+        raise ValueError(f"{name}: expected shape {shape}, got {found.shape}")
+    return found.astype(np.float64)
+
+
+def named_numbers(name: str, values: Mapping[str, float]) -> dict[str, float]:
+    """Finite numbers by name, of either sign."""
+    if not isinstance(values, Mapping):
+        raise wrong(name, "a mapping of names to numbers", values)
+    return {text(name, key): number(f"{name}[{key!r}]", value, signed=True) for key, value in values.items()}
+
+
 def flag(name: str, value: bool) -> bool:
     """True or False."""
-    if not isinstance(value, bool) and type(value).__name__ not in ("bool", "bool_"):
-        raise TypeError(f"{name}: expected True or False, got {value!r}")
+    if not isinstance(value, (bool, np.bool_)):
+        raise wrong(name, "True or False", value)
     return bool(value)
+
+
+def text(name: str, value: str) -> str:
+    """Text."""
+    if not isinstance(value, str):
+        raise wrong(name, "text", value)
+    return value
+
+
+def path(name: str, value: str | os.PathLike[str], expected: str = "a path") -> str:
+    """A path as text."""
+    try:
+        found = os.fspath(value)
+    except TypeError:
+        found = None
+    if not isinstance(found, str):
+        raise wrong(name, expected, value)
+    return found
+
+
+def instance(name: str, value: T, kind: type[T]) -> T:
+    """An object of a class of the package."""
+    if not isinstance(value, kind):
+        raise wrong(name, f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}", value)
+    return value
+
+
+def function(name: str, value: Callable[P, R], expected: str = "a callable") -> Callable[P, R]:
+    """Something that can be called."""
+    if not callable(value):
+        raise wrong(name, expected, value)
+    return value
+
+
+def arm(name: str, value: _native.Arm) -> _native.Arm:
+    """An arm."""
+    return instance(name, value, _native.Arm)

@@ -78,6 +78,8 @@ class Arm:
 
         Raises
         ------
+        TypeError
+            For an argument of the wrong type.
         ValueError
             If no arm of that name is built in, or the files are invalid.
         FileNotFoundError
@@ -106,6 +108,7 @@ class Arm:
         armature: ArrayLike | None = None,
         fixed_joints_rad: Mapping[str, float] | None = None,
         point_mass_radius_m: float | None = None,
+        repair: bool = False,
         strict: bool = False,
     ) -> Arm:
         """Load the arm of a URDF: the chain of movable joints from the root link to the link ``tip``.
@@ -121,16 +124,22 @@ class Arm:
         armature : array_like, (N,), optional
             Rotor inertia of each joint, reflected to the joint (kg m^2). Default: none.
         fixed_joints_rad : mapping of str to float, optional
-            Movable joints that are fixed, each at an angle (rad). Joints that do not carry the tip, such as a
-            gripper's, must be listed.
+            Movable joints that are fixed, each at a position (rad, m for a prismatic joint). Joints that do not carry
+            the tip, such as a gripper's, are fixed without being listed: see the notes.
         point_mass_radius_m : float, optional
             Links with mass but zero inertia are modelled as solid balls of this radius (m). Default: they are
             rejected.
+        repair : bool
+            Replace an inertia that no rigid body has by the nearest one that a rigid body has, with a warning that names
+            both. Default: such a link between root and tip is rejected.
         strict : bool
-            As in :meth:`Arm.load`.
+            As in :meth:`Arm.load`. Joints that are fixed without being listed and inertias that are replaced are rejected
+            too.
 
         Raises
         ------
+        TypeError
+            For an argument of the wrong type.
         ValueError
             If the model is physically inconsistent, not connected or unsupported; the message names file,
             element, value and remedy.
@@ -142,15 +151,16 @@ class Arm:
         Warns
         -----
         UserWarning
-            As :meth:`Arm.load`.
+            As :meth:`Arm.load`; for each kind of joint that is fixed without being listed, and for each inertia that is
+            replaced.
 
         Notes
         -----
-        Friction is read from the URDF's ``<dynamics>``. A joint that does not carry the tip, one that is prismatic or a
-        mimic, and the first ones of more than seven are frozen, each kind with a warning; ``fixed_joints_rad`` gives other
-        positions. A joint whose range, effort or velocity the URDF omits or sets to zero is practically unlimited: one turn
-        in either direction, 1e5 N m, 100 rad/s. That does for dynamics and identification;
-        :func:`design_excitation` needs the true limits too.
+        Friction is read from the URDF's ``<dynamics>``. Joints that do not carry the tip, prismatic ones, mimics, and the
+        first ones of more than seven are fixed; those that ``fixed_joints_rad`` does not list at zero, or at the end of
+        their range that is closest to it, each kind with a warning. A joint whose range, effort or velocity the URDF omits
+        or sets to zero is practically unlimited: one turn in either direction, 1e5 N m, 100 rad/s. That does for dynamics
+        and identification; :func:`design_excitation` needs the true limits too.
 
         Dynamics are those of the URDF, with ``armature``. :func:`simulate`, :func:`simulated` and :func:`excite` take the
         rest, such as gains, home pose and estimated rotor inertias, from :meth:`completed`. They need the limits of
