@@ -149,13 +149,21 @@ pub fn numbers<'py>(
 }
 
 fn converted<'py>(name: &str, value: &Bound<'py, PyAny>) -> PyResult<Array<'py>> {
+    static ARRAY: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     static REQUIRE: PyOnceLock<Py<PyAny>> = PyOnceLock::new();
     let py = value.py();
     // In C order and aligned.
     let keywords = [("dtype", "float64"), ("requirements", "CA")].into_py_dict(py)?;
-    let array = REQUIRE
-        .import(py, "numpy", "require")?
-        .call((value,), Some(&keywords));
+    let array = ARRAY.import(py, "numpy", "asarray")?.call1((value,));
+    let array = array.and_then(|array| {
+        let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
+        // NumPy would read numbers from text.
+        if ["U", "S", "T"].contains(&kind.as_str()) {
+            return Err(PyValueError::new_err("an array of text"));
+        }
+        let require = REQUIRE.import(py, "numpy", "require")?;
+        require.call((array,), Some(&keywords))
+    });
     let array = array.map_err(|cause| {
         let message = format!("{name}: expected numbers, got {}", type_name(value));
         let error = if cause.is_instance_of::<PyTypeError>(py) {

@@ -132,6 +132,10 @@ def test_non_numeric_arguments_are_rejected(arm):
         arm.gravity({})
     with pytest.raises(ValueError, match="q: expected numbers, got str"):
         arm.gravity("wam4")
+    # NumPy reads numbers from text.
+    for text in (["0", "0", "0", "0"], np.array(["0"] * 4), np.array([b"0"] * 4)):
+        with pytest.raises(ValueError, match="q: expected numbers, got"):
+            arm.gravity(text)
 
 
 def test_an_arm_is_immutable(arm):

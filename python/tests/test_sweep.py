@@ -224,6 +224,6 @@ def test_a_wrong_spec_is_named(tmp_path, text, named):
 def test_invalid_arguments_are_rejected():
     with pytest.raises(ValueError, match="seed: expected zero or more, got -1"):
         supple.sweep(tasks.draw, [1.0], seed=-1)
-    with pytest.raises(TypeError, match="function: expected a callable, got int"):
+    with pytest.raises(TypeError, match="function: expected a callable, got 3"):
         supple.sweep(3, [1.0], seed=0)
     assert len(supple.sweep(tasks.draw, [], seed=0)) == 0

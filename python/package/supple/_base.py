@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from supple import _native
-from supple._check import integer
+from supple import _check, _native
+from supple._check import flag, integer
 
 Array = NDArray[np.float64]
 
@@ -79,6 +79,8 @@ def base_parameters(
 
     Raises
     ------
+    TypeError
+        For an argument of the wrong type.
     ValueError
         If a joint does not exist, or there are too few samples.
 
@@ -89,12 +91,15 @@ def base_parameters(
     >>> base.rank, base.columns[:4]
     (22, ('m0', 'mcx0', 'mcy0', 'mcz0'))
     """
+    _check.arm("arm", arm)
+    samples = integer("samples", samples)
+    rotor = flag("rotor", rotor)
     if samples < 20 * arm.dof:
         raise ValueError(f"samples: expected {20 * arm.dof} or more for this arm, got {samples}")
     rng = np.random.default_rng(integer("seed", seed))
     q = rng.uniform(-np.pi, np.pi, size=(samples, arm.dof))
     qd, qdd = rng.normal(scale=3.0, size=(2, samples, arm.dof))
-    joints = list(range(arm.dof)) if moving is None else [int(joint) for joint in moving]
+    joints = list(range(arm.dof)) if moving is None else _check.integers("moving", moving)
     found = _native.base_parameters(arm, [q, qd, qdd], rotor, joints)
     return BaseParameters(
         names=tuple(found["names"]),

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple import _native
+from supple import _check, _native
 from supple._check import flag, integer, number
 from supple._plant import PlantOptions, _chosen
 
@@ -103,6 +103,8 @@ def design_excitation(
 
     Raises
     ------
+    TypeError
+        For an argument of the wrong type.
     ValueError
         If an option is out of range, or no candidate meets the limits.
 
@@ -114,25 +116,24 @@ def design_excitation(
     >>> found.q.shape[1], bool(found.history[-1] <= found.history[-30])
     (3, True)
     """
+    _check.arm("arm", arm)
     if criterion not in ("condition", "d-optimality"):
         raise ValueError(f"criterion: expected condition or d-optimality, got {criterion!r}")
-    if candidates < 1:
-        raise ValueError(f"candidates: expected 1 or more, got {candidates}")
     rate_hz = number("rate_hz", rate_hz, positive=True)
     period_s = number("period_s", period_s, positive=True)
     periods = number("periods", periods, positive=True)
-    candidates = integer("candidates", candidates)
+    candidates = integer("candidates", candidates, least=1)
     seed = integer("seed", seed)
     box = None
     if workspace is not None:
-        array = np.asarray(workspace, float)
-        if array.shape != (2, 3):
-            raise ValueError(f"workspace: expected shape (2, 3), got {array.shape}")
-        box = (array[0].tolist(), array[1].tolist())
+        lower, upper = _check.array("workspace", workspace, (2, 3))
+        box = (lower.tolist(), upper.tolist())
+    if progress is not None:
+        _check.function("progress", progress)
     found = _native.design_excitation(
         arm,
         {
-            "moving": list(range(arm.dof)) if moving is None else [int(j) for j in moving],
+            "moving": list(range(arm.dof)) if moving is None else _check.integers("moving", moving),
             "period_s": period_s,
             "periods": periods,
             "d_optimality": criterion == "d-optimality",
@@ -190,6 +191,8 @@ def excite(
 
     Raises
     ------
+    TypeError
+        For an argument of the wrong type.
     ValueError
         If the controller rejects the motion, or the motion ends in a fault.
 
@@ -202,6 +205,10 @@ def excite(
     >>> recording.q.shape == recording.tau.shape
     True
     """
+    _check.arm("arm", arm)
+    _check.instance("excitation", excitation, Excitation)
+    if model is not None:
+        _check.arm("model", model)
     if encoder_noise_rad is not None:
         encoder_noise_rad = number("encoder_noise_rad", encoder_noise_rad)
     seed = integer("seed", seed)
@@ -218,7 +225,7 @@ def excite(
             "encoder_noise_rad": encoder_noise_rad,
             "load": load,
             "seed": seed,
-            "log_dir": None if log_dir is None else os.fspath(log_dir),
+            "log_dir": None if log_dir is None else _check.path("log_dir", log_dir),
             "plant_options": _chosen(arm, plant_options, realistic),
         },
     )

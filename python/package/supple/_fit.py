@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple import _native
+from supple import _check, _native
 from supple._frames import AXES, table
 from supple._log_input import log_input, log_inputs
 
@@ -57,14 +57,10 @@ class Payload:
         return table(f"Payload of {self.mass_kg:.3f} kg", head, rows)
 
     def _dict(self) -> dict[str, Any]:
-        com, inertia = np.asarray(self.com_m, float), np.asarray(self.inertia_kg_m2, float)
-        for name, array, shape in (("com_m", com, (3,)), ("inertia_kg_m2", inertia, (3, 3))):
-            if array.shape != shape:
-                raise ValueError(f"{name}: expected shape {shape}, got {array.shape}")
         return {
-            "mass_kg": float(self.mass_kg),
-            "com_m": com.tolist(),
-            "inertia_kg_m2": inertia.tolist(),
+            "mass_kg": _check.number("mass_kg", self.mass_kg, signed=True),
+            "com_m": _check.array("com_m", self.com_m, (3,)).tolist(),
+            "inertia_kg_m2": _check.array("inertia_kg_m2", self.inertia_kg_m2, (3, 3)).tolist(),
         }
 
 
@@ -201,7 +197,7 @@ class Fit:
         ValueError
             As :func:`identify`; if the guess is physically inconsistent.
         """
-        found = _native.payload(self._fit, log_inputs(t, q, tau, qd, qdd), guess._dict())
+        found = _native.payload(self._fit, log_inputs(t, q, tau, qd, qdd), _check.instance("guess", guess, Payload)._dict())
         return Payload(**found)
 
     def torque_scale(
@@ -234,7 +230,8 @@ class Fit:
         ValueError
             As :func:`identify`; if the payload is physically inconsistent.
         """
-        return tuple(_native.torque_scale(self._fit, log_inputs(t, q, tau, qd, qdd), known._dict()))
+        payload = _check.instance("known", known, Payload)._dict()
+        return tuple(_native.torque_scale(self._fit, log_inputs(t, q, tau, qd, qdd), payload))
 
     def ripple(
         self,
@@ -271,8 +268,10 @@ class Fit:
         ValueError
             As :func:`identify`; if not all joints were identified, or there is too little slow motion.
         """
-        orders = [int(harmonic) for harmonic in harmonics]
+        orders = _check.integers("harmonics", harmonics)
         logs = log_inputs(t, q, tau, None, None)
+        fast_rad_per_s = _check.number("fast_rad_per_s", fast_rad_per_s, signed=True)
+        cutoff_hz = _check.number("cutoff_hz", cutoff_hz, signed=True)
         found = _native.ripple(self._fit, logs, orders, fast_rad_per_s, cutoff_hz)
         return tuple(tuple(lines) for lines in found)
 
@@ -302,7 +301,7 @@ class Fit:
             If it cannot be written, or the path of a file is a device, FIFO, socket or folder.
         """
         arm = self._fit.arm(ripple)
-        folder = Path(path)
+        folder = Path(_check.path("path", path))
         arm._save(folder)
         return folder / "arm.toml"
 

@@ -11,7 +11,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from supple import _native
+from supple import _check, _native
+from supple._check import flag, integer, number
 from supple._fit import Fit
 from supple._log_input import log_inputs
 
@@ -42,6 +43,13 @@ class FrictionColumns:
     """Stribeck speed (rad/s); ``None`` for no Stribeck effect."""
     band_rad_per_s: float = 0.01
     """Half-width of the parabola (rad/s)."""
+
+    def __post_init__(self) -> None:
+        for name in ("viscous", "coulomb", "offset", "asymmetry"):
+            flag(name, getattr(self, name))
+        if self.stribeck_rad_per_s is not None:
+            number("stribeck_rad_per_s", self.stribeck_rad_per_s, signed=True)
+        number("band_rad_per_s", self.band_rad_per_s, signed=True)
 
 
 _FRICTION = {
@@ -151,6 +159,8 @@ def identify(
 
     Raises
     ------
+    TypeError
+        For an argument of the wrong type.
     ValueError
         For unusable columns (not finite, gaps in time, degrees, joints that hardly move), shapes that do
         not agree, options out of range, or insufficient data; the message names column or argument,
@@ -179,9 +189,11 @@ def identify(
     >>> bool(np.allclose(fit.predict(q, qd, qdd), tau, atol=1e-9))
     True
     """
+    _check.arm("arm", arm)
     if qdd is not None and qd is None:
         raise ValueError("qd: expected velocities together with the accelerations qdd, got None")
-    if isinstance(friction, str) and friction not in ("auto", *_FRICTION):
+    is_known = friction in ("auto", *_FRICTION) if isinstance(friction, str) else isinstance(friction, FrictionColumns)
+    if not is_known:
         known = ", ".join(("auto", *_FRICTION))
         raise ValueError(f"friction: expected one of {known} or FrictionColumns, got {friction!r}")
     if effects not in ("auto", "none"):
@@ -192,25 +204,26 @@ def identify(
         slow_rad_per_s = _SLOW_RAD_PER_S if find_stribeck else 0.0
     if cutoff_hz is None:
         cutoff_hz = inf if qdd is not None else 8.0
+    has_filter = np.ndim(cutoff_hz) > 0 or cutoff_hz != inf
     native, result_warnings = _native.identify(
         arm,
         log_inputs(t, q, tau, qd, qdd),
         {
-            "moving": None if moving is None else [int(joint) for joint in moving],
+            "moving": None if moving is None else _check.integers("moving", moving),
             "couplings": _pairs(coupling),
-            "rate_hz": rate_hz,
-            "cutoff_hz": None if cutoff_hz == inf else cutoff_hz,
-            "keep_every": keep_every,
-            "torque_delay_s": torque_delay_s,
+            "rate_hz": _optional("rate_hz", rate_hz),
+            "cutoff_hz": number("cutoff_hz", cutoff_hz, signed=True) if has_filter else None,
+            "keep_every": integer("keep_every", keep_every),
+            "torque_delay_s": _optional("torque_delay_s", torque_delay_s),
             "find_stribeck": find_stribeck,
-            "method": method,
+            "method": _check.text("method", method),
             "friction": columns,
             "effects": effects == "auto",
-            "rotor": rotor,
-            "slow_rad_per_s": slow_rad_per_s,
-            "prior_weight": prior_weight,
-            "accept_wrong_logs": accept_wrong_logs,
-            "joint_noise_nm": _optional_list(joint_noise_nm),
+            "rotor": flag("rotor", rotor),
+            "slow_rad_per_s": number("slow_rad_per_s", slow_rad_per_s, signed=True),
+            "prior_weight": _optional("prior_weight", prior_weight),
+            "accept_wrong_logs": flag("accept_wrong_logs", accept_wrong_logs),
+            "joint_noise_nm": _noise(joint_noise_nm),
         },
     )
     for warning in result_warnings:
@@ -234,14 +247,21 @@ def identify(
     )
 
 
-def _optional_list(values: ArrayLike | None) -> list[float] | None:
-    return None if values is None else [float(value) for value in np.asarray(values, float)]
+def _optional(name: str, value: float | None) -> float | None:
+    return None if value is None else number(name, value, signed=True)
+
+
+def _noise(joint_noise_nm: ArrayLike | None) -> list[float] | None:
+    return None if joint_noise_nm is None else list(_check.array("joint_noise_nm", joint_noise_nm).ravel())
 
 
 def _pairs(coupling: Any) -> list[tuple[int, int]]:
     if coupling is None:
         return []
-    array = np.asarray(coupling)
+    try:
+        array = np.asarray(coupling)
+    except ValueError:
+        array = np.zeros(0)
     if array.ndim not in (1, 2) or array.shape[-1] != 2:
         raise ValueError(f"coupling: expected a pair of joints or a list of pairs, got {coupling!r}")
-    return [(int(a), int(b)) for a, b in np.atleast_2d(array)]
+    return [(integer("coupling", a), integer("coupling", b)) for a, b in np.atleast_2d(array)]

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple import _native
+from supple import _check, _native
+from supple._check import integer, number
 from supple._log_input import log_inputs
 
 Array = NDArray[np.float64]
@@ -76,7 +77,7 @@ def learn(
 
     Raises
     ------
-    ValueError
+    TypeError, ValueError
         As :func:`identify`; if no joint moved faster than ``slow_rad_per_s``.
 
     Examples
@@ -95,18 +96,19 @@ def learn(
     >>> bool(np.allclose(ratios, 1.1, atol=0.02))
     True
     """
+    _check.arm("arm", arm)
     found = _native.learn(
         arm,
         log_inputs(t, q, tau, qd, None),
         {
-            "moving": list(range(arm.dof)) if moving is None else [int(joint) for joint in moving],
-            "cutoff_hz": cutoff_hz,
-            "keep_every": keep_every,
-            "torque_delay_s": torque_delay_s,
-            "slow_rad_per_s": slow_rad_per_s,
-            "friction_change": friction_change,
-            "payload_kg": payload_kg,
-            "noise_nm": noise_nm,
+            "moving": list(range(arm.dof)) if moving is None else _check.integers("moving", moving),
+            "cutoff_hz": number("cutoff_hz", cutoff_hz, signed=True),
+            "keep_every": integer("keep_every", keep_every),
+            "torque_delay_s": number("torque_delay_s", torque_delay_s, signed=True),
+            "slow_rad_per_s": number("slow_rad_per_s", slow_rad_per_s, signed=True),
+            "friction_change": number("friction_change", friction_change, signed=True),
+            "payload_kg": None if payload_kg is None else number("payload_kg", payload_kg, signed=True),
+            "noise_nm": number("noise_nm", noise_nm, signed=True),
         },
     )
     payload = found["payload"]

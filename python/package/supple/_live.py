@@ -11,7 +11,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from supple import _native
+from supple import _check, _native
 from supple._check import flag, integer, number
 from supple._frames import Tabular
 from supple._plant import PlantOptions, _chosen
@@ -146,7 +146,10 @@ def connect(prefix: str | None = None, *, watch: bool = False, timeout_s: float 
     ...
     ConnectionError: no system is running under the prefix `nobody`: start one with `supple up`, ...
     """
-    return System(_native.Connection(prefix, timeout_s), watch=watch)
+    if prefix is not None:
+        prefix = _check.text("prefix", prefix)
+    watch = flag("watch", watch)
+    return System(_native.Connection(prefix, number("timeout_s", timeout_s)), watch=watch)
 
 
 def simulated(
@@ -206,21 +209,19 @@ def simulated(
     >>> bool(abs(state.tip_position_m[2] - start[2] - 0.01) < 2e-3)
     True
     """
+    _check.arm("arm", arm)
     seed = integer("seed", seed)
     stiffness_n_per_m = number("stiffness_n_per_m", stiffness_n_per_m)
     gravity_error = number("gravity_error", gravity_error)
     friction_error = number("friction_error", friction_error)
-    if model is not None and (gravity_error or friction_error):
-        raise ValueError("gravity_error, friction_error: expected 0 if model is given")
+    if model is not None:
+        _check.arm("model", model)
+        if gravity_error or friction_error:
+            raise ValueError("gravity_error, friction_error: expected 0 if model is given")
     block = flag("block", block)
     start = None
     if start_rad is not None:
-        start = np.asarray(start_rad, dtype=np.float64)
-        if start.shape != (arm.dof,):
-            raise ValueError(
-                f"start_rad: expected shape ({arm.dof},), one angle for each joint, got {start.shape}"
-            )
-        start = start.tolist()
+        start = _check.array("start_rad", start_rad, (arm.dof,)).tolist()
     options = {
         "start_rad": start,
         "stiffness_n_per_m": stiffness_n_per_m,
@@ -328,6 +329,7 @@ class System:
         ConnectionError
             If the system ends.
         """
+        duration_s = number("duration_s", duration_s)
         begin = self._native.received()
         self.wait(duration_s)
         return _states(self._native.read(begin), self.period_s)
@@ -340,7 +342,7 @@ class System:
         duration_s : float
             Time that they span (s).
         """
-        cycles = max(1, round(duration_s / self.period_s))
+        cycles = max(1, round(number("duration_s", duration_s) / self.period_s))
         begin = max(0, self._native.received() - cycles)
         return _states(self._native.read(begin), self.period_s)
 
@@ -354,6 +356,7 @@ class System:
         every_s : float
             Time between two blocks (s). The stream ends if no cycle comes for a second more than that.
         """
+        every_s = number("every_s", every_s)
         received = self._native.received()
         cycles = max(1, round(every_s / self.period_s))
         while True:
@@ -372,6 +375,7 @@ class System:
         duration_s : float
             Time (s), zero or more. When the host stalls, the time of a simulated arm pauses.
         """
+        duration_s = number("duration_s", duration_s)
         received = self._native.received() + max(1, round(duration_s / self.period_s)) - 1
         while not self._native.wait(received, 5.0):
             before = self._native.received()
@@ -412,7 +416,12 @@ class System:
             With the controller's reason.
         """
         self._check_command()
-        numbers = np.asarray(values, dtype=np.float64).ravel().tolist()
+        kind = _check.text("kind", kind)
+        if trajectory is not None:
+            trajectory = _check.text("trajectory", trajectory)
+        if at_cycle is not None:
+            at_cycle = integer("at_cycle", at_cycle)
+        numbers = _check.array("values", values).ravel().tolist()
         try:
             cycle, mode = self._native.request(kind, numbers, trajectory, at_cycle)
         except RuntimeError as refusal:
@@ -452,6 +461,7 @@ class System:
             Return after its duration; the state's mode tells whether something has ended it.
         """
         target = self._joints("target_rad", target_rad)
+        duration_s = number("duration_s", duration_s)
         answer = self.request("move", [*target, duration_s])
         if wait:
             self.wait(duration_s)
@@ -472,6 +482,7 @@ class System:
             Return after its duration; the state's mode tells whether something has ended it.
         """
         target = self.state.q if target_rad is None else self._joints("target_rad", target_rad)
+        duration_s = number("duration_s", duration_s)
         answer = self.request("joint_impedance", [*target, duration_s])
         if wait:
             self.wait(duration_s)
@@ -497,6 +508,7 @@ class System:
         ramp_s : float
             Time of the ramp (s).
         """
+        ramp_s = number("ramp_s", ramp_s)
         given = (stiffness_n_per_m, damping_n_s_per_m)
         if axes != "base" or any(value is not None and np.ndim(value) == 2 for value in given):
             matrices = [
@@ -528,6 +540,7 @@ class System:
         ramp_s : float
             Time of the ramp (s).
         """
+        ramp_s = number("ramp_s", ramp_s)
         stiffness = _symmetric("stiffness_nm_per_rad", stiffness_nm_per_rad)
         damping = _symmetric("damping_nm_s_per_rad", damping_nm_s_per_rad)
         return self.request("gain_matrices", [1.0, *stiffness, *damping, _axes_code(axes), ramp_s])
@@ -550,6 +563,8 @@ class System:
         length = float(np.linalg.norm(direction))
         if not length > 0.0:
             raise ValueError(f"axis: expected a direction, got {direction.tolist()}")
+        angle_rad = number("angle_rad", angle_rad, signed=True)
+        duration_s = number("duration_s", duration_s)
         values = [*(direction / length), angle_rad, duration_s, *self._reference_m()]
         answer = self.request("track_pose", values, trajectory="hold")
         if wait:
@@ -568,12 +583,13 @@ class System:
         ramp_s : float
             Time of the ramp (s).
         """
+        ramp_s = number("ramp_s", ramp_s)
         values = []
         for name, given in (
             ("stiffness_nm_per_rad", stiffness_nm_per_rad),
             ("damping_nm_s_per_rad", damping_nm_s_per_rad),
         ):
-            array = np.asarray(given, dtype=np.float64)
+            array = _check.array(name, given)
             values += list(np.full(self.dof, array) if array.ndim == 0 else self._joints(name, array))
         return self.request("joint_gains", [*values, ramp_s])
 
@@ -593,6 +609,7 @@ class System:
         wait : bool
             Return after its duration; the state's mode tells whether something has ended it.
         """
+        duration_s = number("duration_s", duration_s)
         values = [*self._reference_m(), *_axes("to_m", to_m, None), duration_s]
         answer = self.request("track", values, trajectory="line")
         if wait:
@@ -615,6 +632,8 @@ class System:
         ramp_s : float
             Time in which it reaches its speed (s).
         """
+        frequency_hz = number("frequency_hz", frequency_hz, signed=True)
+        ramp_s = number("ramp_s", ramp_s)
         centre = _axes("centre_m", centre_m, self._reference_m())
         amplitude = _axes("amplitude_m", amplitude_m, None)
         values = [*centre, *amplitude, 2.0 * np.pi * frequency_hz, ramp_s]
@@ -650,7 +669,7 @@ class System:
         return now.tip_position_m if now.reference_position_m is None else now.reference_position_m
 
     def _joints(self, name: str, given: ArrayLike) -> Array:
-        array = np.asarray(given, dtype=np.float64)
+        array = _check.array(name, given)
         if array.shape != (self.dof,):
             raise ValueError(f"{name}: expected shape ({self.dof},), one angle for each joint, got {array.shape}")
         return array
@@ -665,6 +684,8 @@ class SetPoints:
 
     def __init__(self, system: System, rate_hz: float, lead_s: float) -> None:
         system._check_command()
+        rate_hz = number("rate_hz", rate_hz, signed=True)
+        lead_s = number("lead_s", lead_s, signed=True)
         fastest = 1.0 / system.period_s
         if not 0.0 < rate_hz <= 1.001 * fastest:
             raise ValueError(
@@ -795,7 +816,7 @@ class SetPoints:
 def _axes(name: str, given: ArrayLike | None, otherwise: Array | None) -> Array:
     if given is None and otherwise is not None:
         return otherwise
-    array = np.asarray(given, dtype=np.float64)
+    array = _check.array(name, np.nan if given is None else given)
     if array.ndim == 0 and otherwise is not None:
         array = np.full(3, array)
     if array.shape != (3,):
@@ -806,7 +827,7 @@ def _axes(name: str, given: ArrayLike | None, otherwise: Array | None) -> Array:
 
 def _symmetric(name: str, given: ArrayLike | None) -> list[float]:
     """Entries xx, yy, zz, yz, zx, xy of a symmetric matrix, or of a diagonal one from a number or three."""
-    array = np.asarray(np.nan if given is None else given, dtype=np.float64)
+    array = _check.array(name, np.nan if given is None else given)
     if array.ndim == 0:
         array = np.full(3, array)
     if array.shape == (3,):

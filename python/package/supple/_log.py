@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from os import PathLike, fspath
+from os import PathLike
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from supple import _native
+from supple import _check, _native
 from supple._frames import Tabular
 
 Array = NDArray[np.float64]
@@ -141,7 +141,7 @@ def read_log(path: str | PathLike[str]) -> Log:
     >>> log.q.shape[1], str(log.mode[0]), str(log.mode[-1])
     (4, 'gravity_hold', 'track')
     """
-    content = _native.read_log(fspath(path))
+    content = _native.read_log(_check.path("path", path))
     steps, truth = content["steps"], content["truth"]
     flags = {
         name: steps[name].astype(bool) for name in ("has_reference", "has_tip_force", "in_contact")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 
-from supple import _native
+from supple import _check, _native
 
 PlantOptions = Mapping[str, float] | str | os.PathLike[str]
 
@@ -40,16 +40,19 @@ def plant_options(name: str = "realistic") -> dict[str, float]:
     >>> options["cable_stiffness_nm_per_rad"]
     3000.0
     """
-    return _native.plant_options(name)
+    return _native.plant_options(_check.text("name", name))
 
 
 def _chosen(
     arm: _native.Arm, options: PlantOptions | None, realistic: bool
 ) -> dict[str, float] | str | None:
+    realistic = _check.flag("realistic", realistic)
     if options is not None and realistic:
         raise ValueError("realistic: expected False if plant_options is given")
     if realistic:
         return plant_options(_native.realistic_set(arm))
-    if options is None or isinstance(options, Mapping):
-        return None if options is None else dict(options)
-    return os.fspath(options)
+    if options is None:
+        return None
+    if isinstance(options, Mapping):
+        return _check.named_numbers("plant_options", options)
+    return _check.path("plant_options", options, "a mapping or a path")

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from supple import _native
+from supple import _check, _native
 from supple._check import flag, integer, number
 from supple._frames import Tabular
 from supple._plant import PlantOptions, _chosen
@@ -131,6 +131,8 @@ def simulate(
 
     Raises
     ------
+    TypeError
+        For an argument of the wrong type.
     ValueError
         For an unknown experiment, an invalid value, or an arm that cannot reach the trajectory.
     RuntimeError
@@ -143,6 +145,7 @@ def simulate(
     >>> run.rms_error_m < 0.005, run.ended
     (True, None)
     """
+    _check.arm("arm", arm)
     if experiment not in EXPERIMENTS:
         known = ", ".join(EXPERIMENTS)
         raise ValueError(f"experiment: expected one of {known}, got {experiment!r}")
@@ -158,10 +161,14 @@ def simulate(
     seed = integer("seed", seed)
     stribeck, load = flag("stribeck", stribeck), flag("load", load)
     fade, learning = flag("fade", fade), flag("learning", learning)
-    if model is not None and (gravity_error or friction_error):
-        raise ValueError("gravity_error, friction_error: expected 0 if model is given")
-    if log_dir is not None:
-        Path(log_dir).mkdir(parents=True, exist_ok=True)
+    if model is not None:
+        _check.arm("model", model)
+        if gravity_error or friction_error:
+            raise ValueError("gravity_error, friction_error: expected 0 if model is given")
+    effects = _chosen(arm, plant_options, realistic)
+    folder = None if log_dir is None else _check.path("log_dir", log_dir)
+    if folder is not None:
+        Path(folder).mkdir(parents=True, exist_ok=True)
     result = _native.simulate(
         arm,
         model,
@@ -177,8 +184,8 @@ def simulate(
             "fade": fade,
             "learning": learning,
             "seed": seed,
-            "log_dir": None if log_dir is None else os.fspath(log_dir),
-            "plant_options": _chosen(arm, plant_options, realistic),
+            "log_dir": folder,
+            "plant_options": effects,
         },
     )
     cycles = result["cycles"]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Generic, TypeVar, overload
 
 import numpy as np
 
+from supple import _check
 from supple._check import integer
 from supple._frames import table
 from supple._progress import bar
@@ -136,7 +137,7 @@ def sweep(
     Raises
     ------
     TypeError
-        If ``function`` is not callable.
+        For an argument of the wrong type.
     ValueError
         If the seed is negative.
     Exception
@@ -152,9 +153,15 @@ def sweep(
     >>> len(set(draws))
     20
     """
-    if not callable(function):
-        raise TypeError(f"function: expected a callable, got {type(function).__name__}")
+    _check.function("function", function)
     seed = integer("seed", seed)
+    _check.iterable("parameters", parameters)
+    if executor is not None and not hasattr(executor, "submit"):
+        raise _check.wrong("executor", "an executor", executor)
+    if progress is not None and not isinstance(progress, bool):
+        _check.function("progress", progress, "a callable, True or False")
+    if results is not None:
+        results = _check.path("results", results)
     report = bar("sweep") if progress is True else progress or None
     given = tuple(parameters)
     seeds = tuple(
