@@ -8,6 +8,7 @@ use crate::plant_options::PlantEffects;
 use crate::table::Table;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::PathBuf;
 use supple_experiment::calibrate::{Calibration, log_of, plant_of};
 use supple_experiment::{ExperimentError, excitation};
@@ -55,7 +56,7 @@ impl From<Series> for SeriesLists {
 }
 
 /// Searches for an excitation. `progress` receives the number of candidates and the best value so far, at most
-/// a hundred times. An exception in `progress` stops the search.
+/// a hundred times. An exception in `progress` and a signal's stop the search.
 #[pyfunction]
 pub fn design_excitation<'py>(
     py: Python<'py>,
@@ -67,26 +68,30 @@ pub fn design_excitation<'py>(
     let every = (request.candidates / 100).max(1);
     let mut raised: Option<PyErr> = None;
     let mut report_progress = |tried: usize, best: f64| {
-        if raised.is_some() || !tried.is_multiple_of(every) {
-            return;
-        }
         let result = Python::attach(|py| {
             py.check_signals()?;
             match &progress {
-                Some(progress) => progress.call1(py, (tried, best)).map(drop),
-                None => Ok(()),
+                Some(progress) if tried.is_multiple_of(every) => {
+                    progress.call1(py, (tried, best)).map(drop)
+                }
+                _ => Ok(()),
             }
         });
-        raised = result.err();
+        if let Err(error) = result {
+            raised = Some(error);
+            // The search has no other way out; its state is dropped.
+            resume_unwind(Box::new("stopped"));
+        }
     };
     let columns = py.detach(|| {
-        with_dof!(description.dof(), N => searched::<N>(description, &request, &mut report_progress))
-            .map_err(Refused::Model)
-            .flatten()
+        let search = || with_dof!(description.dof(), N => searched::<N>(description, &request, &mut report_progress));
+        catch_unwind(AssertUnwindSafe(search))
     });
-    if let Some(error) = raised {
-        return Err(error);
-    }
+    let columns = match (columns, raised) {
+        (_, Some(error)) => return Err(error),
+        (Err(panic), None) => resume_unwind(panic),
+        (Ok(columns), None) => columns.map_err(Refused::Model).flatten(),
+    };
     let found = columns.map_err(|refused| match refused {
         Refused::Model(error) => errors::model(error),
         Refused::Design(error) => errors::identification(error),

@@ -177,16 +177,25 @@ def test_a_failing_task_keeps_the_finished_ones():
     assert list(raised.value.sweep)[:3] == [0, 10, 20]
 
 
+# The signal comes after a given processor time of the process and has Ctrl-C's handler. What a busy machine does
+# besides has no influence. A calculation that goes on is killed after 30 s of processor time.
 PROGRAM = """
-import time
+import resource, signal, time
+from pathlib import Path
 import supple
 arm = supple.Arm.load("wam4")
 {before}
-print("ready", flush=True)
+resource.setrlimit(resource.RLIMIT_CPU, (int(time.process_time()) + 30,) * 2)
+signal.signal(signal.SIGPROF, signal.default_int_handler)
+due_s = time.process_time() + {after_s}
+signal.setitimer(signal.ITIMER_PROF, {after_s})
 try:
     {call}
 except KeyboardInterrupt:
-    print(time.monotonic(), flush=True)
+    print(time.process_time() - due_s)
+    threads = lambda: [(task / "comm").read_text().strip() for task in Path("/proc/self/task").iterdir()]
+    while "supple" in threads():
+        time.sleep(0.01)
 """
 
 CALLS = {
@@ -197,38 +206,29 @@ CALLS = {
         "log = supple.excite(arm, motion)",
         "[supple.identify(arm, log.t, log.q, log.tau) for _ in range(1000)]",
     ),
+    "design_excitation": ("", "supple.design_excitation(arm, candidates=10**6)"),
 }
-# Loosely: what is promised is 0.2 s on a machine with nothing else to do.
-INTERRUPTED_WITHIN_S = 5.0
+# Processor time from the signal to the exception (s).
+HEARD_WITHIN_S = 0.2
 
 
-def interrupted(before, call):
-    """Seconds from the signal to the exception; the calculation itself takes minutes."""
-    program = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM.format(before=before, call=call)],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    assert program.stdout is not None
-    try:
-        assert program.stdout.readline() == "ready\n"
-        time.sleep(0.5)
-        sent = time.monotonic()
-        program.send_signal(signal.SIGINT)
-        # The clock is the machine's, the same in both processes.
-        return float(program.stdout.readline()) - sent
-    finally:
-        program.kill()
-        program.communicate()
+def interrupted(before, call, after_s):
+    """Processor time from a signal to the exception (s) during a calculation that would take minutes."""
+    program = PROGRAM.format(before=before, call=call, after_s=after_s)
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"it went on after the interrupt: exit code {done.returncode}, {done.stderr}"
+    return float(done.stdout)
 
 
 @pytest.mark.parametrize(("before", "call"), CALLS.values(), ids=CALLS.keys())
-def test_an_interrupt_ends_a_long_calculation(before, call, capsys):
-    interrupted_s = sorted(interrupted(before, call) for _ in range(3))
-    with capsys.disabled():
-        print(f" interrupted after {', '.join(f'{1e3 * seconds:.0f}' for seconds in interrupted_s)} ms", end="")
-    assert interrupted_s[1] < INTERRUPTED_WITHIN_S
+# The first one shortly after the beginning: a look for signals at long intervals is then heard late for certain.
+@pytest.mark.parametrize("after_s", [0.05, 0.3])
+def test_an_interrupt_ends_a_long_calculation(before, call, after_s):
+    heard_s = interrupted(before, call, after_s)
+    if heard_s > HEARD_WITHIN_S:
+        # In a virtual machine the time that others take may count as the process's own: late is what is late again.
+        heard_s = interrupted(before, call, after_s)
+    assert heard_s <= HEARD_WITHIN_S
 
 
 def worker_threads():

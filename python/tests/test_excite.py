@@ -3,6 +3,9 @@ the model."""
 
 from __future__ import annotations
 
+import contextlib
+import time
+
 import numpy as np
 import pytest
 import supple
@@ -52,6 +55,15 @@ def test_progress_is_reported_and_may_stop_the_search(arm):
 
     with pytest.raises(InterruptedError, match="enough"):
         supple.design_excitation(arm, candidates=50, period_s=5.0, periods=1, progress=enough)
+
+    def cpu_s(progress):
+        before = time.process_time()
+        with contextlib.suppress(InterruptedError):
+            supple.design_excitation(arm, candidates=1000, progress=progress)
+        return time.process_time() - before
+
+    # It stops after one in a hundred of the candidates.
+    assert cpu_s(enough) < 0.5 * cpu_s(None)
 
 
 def test_the_identified_model_controls_the_arm_it_came_from(arm, excitation):

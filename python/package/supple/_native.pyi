@@ -891,7 +891,7 @@ def design_excitation(
     arm: Arm, request: dict[str, Any], progress: Callable[[int, float], object] | None
 ) -> dict[str, Any]:
     """Searches for an excitation. `progress` receives the number of candidates and the best value so far, at most
-    a hundred times. An exception in `progress` stops the search.
+    a hundred times. An exception in `progress` and a signal's stop the search.
     """
 
 def excite(
