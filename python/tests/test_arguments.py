@@ -111,6 +111,7 @@ WRONG_TYPES = [
     ("joint_noise_nm: expected numbers", lambda: supple.identify(ARM, **LOG, joint_noise_nm=["1"] * 4)),
     ("accept_wrong_logs: expected True or False", lambda: supple.identify(ARM, **LOG, accept_wrong_logs="no")),
     ("viscous: expected True or False", lambda: supple.FrictionColumns(viscous="yes")),
+    ("load: expected", lambda: supple.FrictionColumns(load=True)),
     ("band_rad_per_s: expected a number", lambda: supple.FrictionColumns(band_rad_per_s="0.01")),
     ("cutoff_hz: expected a number", lambda: supple.learn(ARM, **LOG, cutoff_hz="8")),
     ("samples: expected an integer", lambda: supple.base_parameters(ARM, samples="500")),

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -31,6 +32,21 @@ def test_the_motion_is_consistent(arm, excitation):
     assert (np.diff(excitation.history[np.isfinite(excitation.history)]) <= 0.0).all()
     assert excitation.rank == supple.base_parameters(arm, rotor=True).rank + 2 * arm.dof
     assert excitation.condition == pytest.approx(excitation.history[-1], rel=0.2)
+
+
+def test_a_urdf_alone_is_excited_and_identified():
+    """Its motors are not described: its encoders measure at the joints, where the noise of a WAM's motors is a fault."""
+    urdf = Path(__file__).parents[2] / "assets/wam3/arm.urdf"
+    arm = supple.Arm.from_urdf(urdf, tip="tip")
+    motion = supple.design_excitation(arm, candidates=60, period_s=8.0, periods=2)
+    recording = supple.excite(arm, motion)
+    fit = supple.identify(
+        arm, recording.t, recording.q, recording.tau, torque_delay_s=recording.torque_delay_s
+    )
+    assert fit.training_relative < 0.05
+    assert supple.plant_options("urdf-realistic")["encoder_noise_rad"] < 1e-4
+    with pytest.raises(ValueError, match="external torque|oscillates|turns at"):
+        supple.excite(arm, motion, encoder_noise_rad=5e-3)
 
 
 def test_the_tip_stays_in_the_workspace(arm):
