@@ -32,7 +32,7 @@ pub struct Description {
     capsules: Vec<Capsule>,
     toml: String,
     urdf: String,
-    warnings: Vec<Finding>,
+    pub(crate) warnings: Vec<Finding>,
 }
 
 impl Description {
@@ -216,8 +216,8 @@ impl Description {
 
     /// Ignored content of the URDF, each kind once with its first occurrence: Gazebo's elements, `mu_coulomb`, an
     /// `<origin>` of a link. Dynamics and limits do not depend on it; unknown content that could change them is
-    /// rejected. Then the joints that were frozen and the inertias that were replaced without a word of the TOML. Empty
-    /// for the built-in arms.
+    /// rejected. Then the joints that were frozen, the inertias that were replaced and the tip that was chosen without a
+    /// word of the TOML or of the caller. Empty for the built-in arms.
     pub fn warnings(&self) -> &[Finding] {
         &self.warnings
     }
@@ -377,16 +377,18 @@ impl Description {
         &self.toml_file
     }
 
-    /// The same arm with another TOML.
+    /// The same arm with a TOML that says more; the warnings stay those of what was given.
     pub(crate) fn with_toml(&self, toml: String) -> Result<Self, ModelError> {
         let settings = parse_toml(&self.toml_file, &toml)?;
-        Self::build(
+        let mut description = Self::build(
             settings,
             self.toml_file.clone(),
             toml,
             self.urdf_file.clone(),
             self.urdf.clone(),
-        )
+        )?;
+        description.warnings.clone_from(&self.warnings);
+        Ok(description)
     }
 
     pub(crate) fn robot(&self) -> &Robot {

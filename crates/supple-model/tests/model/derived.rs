@@ -217,3 +217,93 @@ fn a_urdf_alone_makes_an_arm() {
         assert!(message.contains(fragment), "{message}");
     }
 }
+
+/// Writes a URDF of two revolute joints, a third joint of this type, and a fixed flange beside it.
+fn gripper_urdf(folder: &std::path::Path, last: &str) -> UrdfName {
+    let inertial = "<inertial><mass value=\"1\"/><inertia ixx=\"0.01\" ixy=\"0\" ixz=\"0\" iyy=\"0.01\" iyz=\"0\" \
+                    izz=\"0.01\"/></inertial>";
+    let mut urdf = "<robot name=\"arm\">".to_owned();
+    for link in [
+        "base", "upper", "lower", "wrist", "hand", "finger", "flange",
+    ] {
+        urdf += &format!("<link name=\"{link}\">{inertial}</link>");
+    }
+    for (name, kind, parent, child) in [
+        ("shoulder", "revolute", "base", "upper"),
+        ("elbow", "revolute", "upper", "lower"),
+        ("roll", "revolute", "lower", "wrist"),
+        ("mount", "fixed", "wrist", "hand"),
+        ("grip", last, "hand", "finger"),
+        ("plate", "fixed", "hand", "flange"),
+    ] {
+        urdf += &format!(
+            "<joint name=\"{name}\" type=\"{kind}\"><origin xyz=\"0 0 0.3\"/><parent link=\"{parent}\"/><child \
+             link=\"{child}\"/><axis xyz=\"0 1 0\"/><limit lower=\"-2\" upper=\"2\" effort=\"20\" velocity=\"2\"/></joint>"
+        );
+    }
+    let path = folder.join("gripper.urdf");
+    std::fs::write(&path, urdf + "</robot>").unwrap();
+    UrdfName::parse(&path.display().to_string()).unwrap()
+}
+
+/// No URDF says whether its last joint belongs to a gripper: the warning names both tips, also once all is derived.
+#[test]
+fn the_tip_that_nobody_named_is_a_warning_with_the_link_before_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let name = gripper_urdf(folder.path(), "revolute");
+    let arm = Description::from_urdf(&name).unwrap();
+    assert_eq!(arm.settings().tip_frame, "finger");
+    let completed = arm.clone().completed().unwrap().description;
+    for arm in [&arm, &completed] {
+        let lines: Vec<String> = arm.warnings().iter().map(ToString::to_string).collect();
+        assert_eq!(lines.len(), 1, "{lines:#?}");
+        for part in ["`finger`", "joint `grip`", "--tip hand", "--tip finger"] {
+            assert!(lines[0].contains(part), "{part} in {}", lines[0]);
+        }
+    }
+    assert!(arm.strict().is_err());
+    let named = UrdfName {
+        tip: Some("finger".to_owned()),
+        ..name
+    };
+    assert!(Description::from_urdf(&named).unwrap().strict().is_ok());
+}
+
+/// A side joint of a URDF is a warning of the arm with all settings, too.
+#[test]
+fn a_completed_arm_has_the_warnings_of_what_was_given() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut name = gripper_urdf(folder.path(), "prismatic");
+    name.tip = Some("flange".to_owned());
+    let completed = Description::from_urdf(&name).unwrap().completed().unwrap();
+    let warnings = completed.description.warnings();
+    assert!(
+        warnings
+            .iter()
+            .any(|line| line.to_string().contains("`grip`")),
+        "{warnings:?}"
+    );
+}
+
+#[test]
+fn a_urdf_without_a_chain_says_what_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("part.urdf");
+    let fixed = "<robot name=\"p\"><link name=\"a\"/><link name=\"b\"/><joint name=\"j\" type=\"fixed\"><parent link=\"a\"/>\
+                 <child link=\"b\"/></joint></robot>";
+    for (text, found) in [
+        (
+            "<robot name=\"p\"><link name=\"a\"/></robot>",
+            "<robot> without any <joint>",
+        ),
+        ("<sdf><model/></sdf>", "<sdf> without any <joint>"),
+        (fixed, "joints: 1 fixed"),
+    ] {
+        std::fs::write(&path, text).unwrap();
+        let name = UrdfName::parse(&path.display().to_string()).unwrap();
+        let message = Description::from_urdf(&name).unwrap_err().to_string();
+        for part in [found, "3 to 7 revolute", "part.urdf"] {
+            assert!(message.contains(part), "{part} in {message}");
+        }
+    }
+}
