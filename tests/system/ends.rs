@@ -109,6 +109,19 @@ fn a_run_that_ends_with_a_fault_is_code_5_with_its_summary() {
     assert!(folder.path().join("run.mcap").exists());
 }
 
+/// Where the emulated arm does not start, its own reason is not followed by what its pendant lacks.
+#[test]
+fn an_emulated_arm_that_does_not_start_is_the_only_failure() {
+    let folder = temporary_folder();
+    let inject = "encoder-stuck:joint=9,at-s=1";
+    let arguments = ["up", "--plant", "emu", "--no-log", "--inject", inject];
+    let output = supple(folder.path(), &arguments).output().expect("it runs");
+    let text = stderr_of(&output);
+    assert_eq!(output.status.code(), Some(10), "{text}");
+    assert!(text.contains("supple-emu: error: "), "{text}");
+    assert!(!text.contains("no arm events"), "{text}");
+}
+
 /// Every program uses the exit codes of `supple --help`.
 #[test]
 fn the_processes_use_the_documented_exit_codes() {
@@ -135,6 +148,7 @@ fn the_processes_use_the_documented_exit_codes() {
             (3, &["--arm", "nowhere/arm.toml"], "nowhere/arm.toml"),
             (3, &["--arm", "./fifo"], "a FIFO"),
             (3, &["--arm", "./arm.toml", "--strict"], "<gazebo>"),
+            (3, &["--arm", "./arm.urdf", "--tip", "no_link"], "no_link"),
         ] {
             let output = run(program, arguments);
             assert_eq!(output.status.code(), Some(code), "{program} {arguments:?}");

@@ -4,7 +4,7 @@ use clap::Parser;
 use core::fmt::Display;
 use std::io::Write as _;
 use supple_bus::Address;
-use supple_model::{Description, ModelError};
+use supple_model::{Description, ModelError, UrdfArgs};
 use supple_puck::safety::SpeedLimit;
 use supple_realtime::{RealtimeOptions, Settings};
 
@@ -15,12 +15,16 @@ use supple_realtime::{RealtimeOptions, Settings};
 #[derive(Clone, Debug, Parser)]
 #[command(name = "supple-can", version)]
 pub struct Options {
-    /// A WAM with 4 or 7 joints, or an arm with `[bus]`: a built-in arm, or the path of its TOML or of its folder.
+    /// A WAM with 4 or 7 joints, or an arm with `[bus]`: a built-in arm, or the path of its TOML, of its
+    /// folder, or of a URDF.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
     /// Treats URDF elements that are not supported as errors instead of warnings.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not contain.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Cycles per second; default: the rate of the arm. All processes of a system must use the same rate.
     #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(10..=10_000))]
     pub rate_hz: Option<u32>,
@@ -69,7 +73,7 @@ impl Options {
     /// # Errors
     /// As [`Description::find_at_rate`]; with `--strict`, also an unsupported URDF element.
     pub fn description(&self) -> Result<Description, ModelError> {
-        Description::find_at_rate(&self.arm, self.rate_hz)?.strict_if(self.strict)
+        Description::find_at_rate(&self.urdf.name(&self.arm), self.rate_hz)?.strict_if(self.strict)
     }
 
     /// Whether the process must end when its parent ends.

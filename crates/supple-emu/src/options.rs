@@ -7,6 +7,7 @@ use crate::safety::ButtonPress;
 use clap::Parser;
 use std::path::PathBuf;
 use supple_bus::Address;
+use supple_model::{Description, ModelError, UrdfArgs};
 use supple_plant::Injection;
 use supple_realtime::{RealtimeOptions, Settings};
 
@@ -19,12 +20,16 @@ use supple_realtime::{RealtimeOptions, Settings};
 #[derive(Clone, Debug, Parser)]
 #[command(name = "supple-emu", version)]
 pub struct Options {
-    /// A WAM with 4 or 7 joints, or an arm with `[bus]`: a built-in arm, or the path of its TOML or of its folder.
+    /// A WAM with 4 or 7 joints, or an arm with `[bus]`: a built-in arm, or the path of its TOML, of its
+    /// folder, or of a URDF.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
     /// Treats URDF elements that are not supported as errors instead of warnings.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not contain.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Prefix of the system, if no bus is given.
     #[arg(
         long,
@@ -84,6 +89,14 @@ pub struct Options {
 }
 
 impl Options {
+    /// The arm.
+    ///
+    /// # Errors
+    /// As [`Description::find`]; with `--strict`, also an unsupported URDF element.
+    pub fn description(&self) -> Result<Description, ModelError> {
+        Description::find(&self.urdf.name(&self.arm))?.strict_if(self.strict)
+    }
+
     /// Whether the process must end when its parent ends.
     pub fn supervised(&self) -> bool {
         self.realtime.supervised

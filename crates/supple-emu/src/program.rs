@@ -49,7 +49,7 @@ fn start(options: &Options) -> Result<(), EmulatorError> {
     if options.supervised() {
         die_with_parent();
     }
-    let description = Description::find(&options.arm)?.strict_if(options.strict)?;
+    let description = options.description()?;
     // The supervising process has already printed the warnings.
     for warning in description
         .warnings()

@@ -31,6 +31,8 @@ pub mod settings;
 mod shapes;
 mod tree;
 pub mod unlimited;
+#[cfg(feature = "clap")]
+mod urdf_args;
 mod urdf_name;
 mod workspace;
 mod xml;
@@ -46,4 +48,6 @@ pub use paths::{PROBE_DWELL_S, Paths};
 pub use resolve::{BusDescription, BusMotor, Motors, Tool};
 pub use settings::{LearnedSettings, Settings, schema_json};
 pub use shapes::{Capsule, Transform};
+#[cfg(feature = "clap")]
+pub use urdf_args::UrdfArgs;
 pub use urdf_name::UrdfName;

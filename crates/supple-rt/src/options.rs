@@ -2,7 +2,7 @@
 
 use clap::Parser;
 use std::path::PathBuf;
-use supple_model::{Description, ModelError};
+use supple_model::{Description, ModelError, UrdfArgs};
 use supple_realtime::{RealtimeOptions, Settings};
 
 /// The controller of one arm: waits for arm states in shared memory and answers with torques.
@@ -11,12 +11,15 @@ use supple_realtime::{RealtimeOptions, Settings};
 #[derive(Clone, Debug, Parser)]
 #[command(name = "supple-rt", version)]
 pub struct Options {
-    /// A built-in arm (see `supple arms`), or the path of an arm's TOML or of its folder.
+    /// A built-in arm (see `supple arms`), or the path of an arm's TOML, of its folder, or of a URDF.
     #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
     pub arm: String,
     /// Treats URDF elements that are not supported as errors instead of warnings.
     #[arg(long)]
     pub strict: bool,
+    /// What a URDF alone does not contain.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
     /// Cycles per second; the arm's own if not given. All processes of a system need the same.
     #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(10..=10_000))]
     pub rate_hz: Option<u32>,
@@ -42,7 +45,7 @@ impl Options {
     /// # Errors
     /// As [`Description::find_at_rate`]; with `--strict`, also an unsupported URDF element.
     pub fn description(&self) -> Result<Description, ModelError> {
-        Description::find_at_rate(&self.arm, self.rate_hz)?.strict_if(self.strict)
+        Description::find_at_rate(&self.urdf.name(&self.arm), self.rate_hz)?.strict_if(self.strict)
     }
 
     /// Whether the process must end when its parent ends.

@@ -6,7 +6,6 @@ mod identification;
 mod log;
 mod new;
 mod plant;
-mod urdf;
 
 pub use demo::DemoArgs;
 pub use effects::EffectsArgs;
@@ -18,7 +17,7 @@ pub use identification::{
 pub use log::{LogCommand, LogDataCommand, PlotArgs};
 pub use new::NewArgs;
 pub use plant::{PlantArgs, PlantCommand};
-pub use urdf::UrdfArgs;
+pub use supple_model::UrdfArgs;
 
 use crate::exit::CODES;
 use clap::{Args, Subcommand};
