@@ -16,10 +16,20 @@ const ACCELERATION_SHARE: f64 = 0.95;
 /// Points at which the tip's speed is computed.
 const POINTS: u32 = 64;
 
-/// Duration of a minimum-jerk move on a straight line in joint space, at least one second: at most half of the joint speed
-/// limits, 85 % of the tip's, and within the limits of acceleration and jerk \[s\]. It is rounded up to 0.01 s, so that equal
-/// moves give equal logs.
+/// Duration of a minimum-jerk move on a straight line in joint space, at least one second, within the limits as
+/// [`within_limits_s`] \[s\]. It is rounded up to 0.01 s, so that equal moves give equal logs.
 pub fn approach_s<const N: usize>(
+    config: &Config<N>,
+    from_rad: &Vector<N>,
+    to_rad: &Vector<N>,
+) -> f64 {
+    let needed = within_limits_s(config, from_rad, to_rad).max(MOVE_S);
+    (needed * 100.0).ceil() / 100.0
+}
+
+/// Shortest duration of a minimum-jerk move on a straight line in joint space: at most half of the joint speed limits, 85 % of
+/// the tip's, and within the limits of acceleration and jerk \[s\]; zero if the arm is there.
+pub(crate) fn within_limits_s<const N: usize>(
     config: &Config<N>,
     from_rad: &Vector<N>,
     to_rad: &Vector<N>,
@@ -36,7 +46,7 @@ pub fn approach_s<const N: usize>(
         let by_jerk = (MINIMUM_JERK_JERK * distance_rad / jerk).cbrt();
         by_speed.max(by_acceleration).max(by_jerk)
     });
-    let needed = needed.fold(MOVE_S, f64::max);
+    let needed = needed.fold(0.0, f64::max);
     let tip_limit = TIP_SPEED_SHARE * limits.tip_speed_m_per_s;
     // Speed of the tip times the duration of the move.
     let peak_m = (0..=POINTS).map(|k| {
@@ -46,6 +56,5 @@ pub fn approach_s<const N: usize>(
         let velocity: Vector3<f64> = rows.fixed_rows::<3>(0) * (way * rate);
         velocity.norm()
     });
-    let needed = needed.max(peak_m.fold(0.0, f64::max) / tip_limit);
-    (needed * 100.0).ceil() / 100.0
+    needed.max(peak_m.fold(0.0, f64::max) / tip_limit)
 }

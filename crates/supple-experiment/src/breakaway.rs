@@ -75,7 +75,7 @@ pub fn breakaway<const N: usize>(
                 start_rad: *pose_rad,
                 steps: vec![
                     Step::wait(Request::GravityHold, REST_S),
-                    move_to(pose_rad, pose_rad),
+                    move_to(config, pose_rad, pose_rad),
                     Step {
                         until_done: true,
                         ..Step::wait(Request::Breakaway(ramp), limit_nm / RATE_NM_PER_S + REST_S)

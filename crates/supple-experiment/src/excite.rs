@@ -1,6 +1,7 @@
 //! Excitation of the simulated arm: a position-controlled move to the start of each Fourier series, a rest, then
 //! the series.
 
+use crate::approach_time::within_limits_s;
 use crate::request_sequence::{RequestSequence, Step};
 use supple_core::controller::Request;
 use supple_core::trajectory::Fourier;
@@ -17,7 +18,7 @@ const REST_S: f64 = 0.4;
 const SLOW: (f64, f64) = (0.1, 60.0);
 /// Speeds of the runs at constant speed \[rad/s\], and the period of each \[s\].
 const RUNS: ([f64; 2], f64) = ([0.05, 0.1], 40.0);
-/// Mean joint speed of the moves between series \[rad/s\].
+/// Mean joint speed of the moves between series, where the limits allow it \[rad/s\].
 const MOVE_RAD_PER_S: f64 = 0.4;
 
 /// Request sequence that moves to and records each series in turn; the plant starts at rest at `home_rad`.
@@ -32,7 +33,7 @@ pub fn excitation<const N: usize>(
     let mut at = *home_rad;
     for series in series {
         let start = series.at(0.0).position_rad;
-        steps.push(move_to(&start, &at));
+        steps.push(move_to(config, &start, &at));
         steps.push(Step {
             recorded: true,
             ..Step::wait(Request::Excite(*series), series.duration_s)
@@ -75,9 +76,14 @@ pub fn constant_speed_runs<const N: usize>(
     speeds.into_iter().map(run).collect()
 }
 
-/// A move followed by a rest.
-pub(crate) fn move_to<const N: usize>(target_rad: &Vector<N>, from_rad: &Vector<N>) -> Step<N> {
-    let duration_s = ((target_rad - from_rad).amax() / MOVE_RAD_PER_S).max(0.5);
+/// A move followed by a rest. It is as slow as the limits of joints and tip require.
+pub(crate) fn move_to<const N: usize>(
+    config: &Config<N>,
+    target_rad: &Vector<N>,
+    from_rad: &Vector<N>,
+) -> Step<N> {
+    let usual_s = ((target_rad - from_rad).amax() / MOVE_RAD_PER_S).max(0.5);
+    let duration_s = usual_s.max(within_limits_s(config, from_rad, target_rad));
     let request = Request::Move {
         target_rad: *target_rad,
         duration_s,

@@ -249,14 +249,18 @@ impl<const N: usize> Detour<N> {
         let around = self.share_along(from_rad, light_rad);
         let around = around.max(self.share_along(light_rad, to_rad));
         if straight <= TORQUE_SHARE || straight <= around {
-            return vec![move_to(to_rad, from_rad)];
+            return vec![move_to(&self.config, to_rad, from_rad)];
         }
-        vec![move_to(light_rad, from_rad), move_to(to_rad, light_rad)]
+        vec![
+            move_to(&self.config, light_rad, from_rad),
+            move_to(&self.config, to_rad, light_rad),
+        ]
     }
 }
 
 /// Moves to the start of each series and follows it.
 pub fn follow<const N: usize>(
+    config: &Config<N>,
     from_rad: &Vector<N>,
     all: &[Fourier<N>],
     detour: Option<&Detour<N>>,
@@ -267,7 +271,7 @@ pub fn follow<const N: usize>(
         let start_rad = series.at(0.0).position_rad;
         match detour {
             Some(detour) => steps.extend(detour.moves(&at_rad, &start_rad)),
-            None => steps.push(move_to(&start_rad, &at_rad)),
+            None => steps.push(move_to(config, &start_rad, &at_rad)),
         }
         steps.push(Step {
             recorded: true,
@@ -302,10 +306,10 @@ pub fn ramp<const N: usize>(
             ..Step::wait(Request::Breakaway(ramp), duration_s)
         },
         // Gravity that the model lacks would pull the arm away from there.
-        move_to(pose_rad, pose_rad),
+        move_to(config, pose_rad, pose_rad),
     ];
     let is_there = (pose_rad - from_rad).amax() < THERE_RAD;
-    let approach = (!is_there).then(|| move_to(pose_rad, from_rad));
+    let approach = (!is_there).then(|| move_to(config, pose_rad, from_rad));
     approach.into_iter().chain(ramp).collect()
 }
 
@@ -322,6 +326,7 @@ pub fn wiring_slope_nm_per_s<const N: usize>(
 /// Time that ramps in both directions take, for a model with these breakaway torques \[s\].
 pub fn ramps_s<const N: usize>(config: &Config<N>) -> f64 {
     let breakaway_nm: f64 = config.friction.iter().map(|f| f.breakaway_nm).sum();
-    let moves_s = 5.0 * N as f64 * move_to(&Vector::<N>::zeros(), &Vector::zeros()).duration_s;
+    let there = Vector::zeros();
+    let moves_s = 5.0 * N as f64 * move_to(config, &there, &there).duration_s;
     2.0 * breakaway_nm / BREAKAWAY_RAMP.0 + moves_s
 }

@@ -101,13 +101,13 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
 
     /// Time of all motion, about \[s\].
     pub(super) fn stated_s(&self, config: &Config<N>, motions: &Motions<N>) -> f64 {
-        let all: f64 = follow(&self.home_rad, &motions.all(), None)
+        let all: f64 = follow(config, &self.home_rad, &motions.all(), None)
             .iter()
             .map(|step| step.duration_s)
             .sum();
         let (_, sinusoid_s) = self.start.paths().sinusoid(1.0);
-        let returns_s =
-            9.0 * move_to(&motions.first.at(0.0).position_rad, &self.home_rad).duration_s;
+        let first_rad = motions.first.at(0.0).position_rad;
+        let returns_s = 9.0 * move_to(config, &first_rad, &self.home_rad).duration_s;
         all + self.options.warm_up_s
             + ramps_s(config)
             + REST_S

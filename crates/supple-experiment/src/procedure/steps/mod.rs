@@ -69,6 +69,8 @@ struct Run<'a, const N: usize, A> {
     progress: Progress,
     names: Vec<String>,
     home_rad: Vector<N>,
+    /// The given arm with its limits, which no stage changes: it times the moves.
+    limits: Config<N>,
     loaded: Option<Stage>,
     /// Pose in which gravity needs little torque, of an arm that falls without torque.
     light_rad: Option<Vector<N>>,
@@ -100,6 +102,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         };
         Ok(Run {
             home_rad: start.home::<N>()?,
+            limits: config::<N>(start)?,
             names: start.joint_names().to_vec(),
             arm,
             start,
@@ -204,9 +207,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             return Ok(());
         }
         if self.loaded.is_some() {
-            let home_rad = self.home_rad;
-            let name = format!("home-before-{}", name_of(stage));
-            self.motion(&name, &|from| vec![move_to(&home_rad, from)])?;
+            self.home(&format!("home-before-{}", name_of(stage)))?;
         }
         self.say(&format!(
             "the controller starts with the {}",
@@ -228,6 +229,12 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         self.arm.load(&model)?;
         self.loaded = Some(stage);
         Ok(())
+    }
+
+    /// Moves to the home pose.
+    fn home(&mut self, name: &str) -> Result<Done, A::Error> {
+        let (home_rad, limits) = (self.home_rad, self.limits);
+        self.motion(name, &|from| vec![move_to(&limits, &home_rad, from)])
     }
 
     /// Performs a motion that begins where the arm is. After a contact it is repeated.

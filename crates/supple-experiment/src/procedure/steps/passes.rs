@@ -9,8 +9,8 @@ use crate::procedure::error::ProcedureError;
 use crate::procedure::motions::{BREAKAWAY_RAMP, Motions, follow, ramp};
 use crate::procedure::progress::StepName;
 use crate::run::joint_label;
-use supple_core::Config;
 use supple_core::trajectory::Fourier;
+use supple_core::{Config, Vector};
 
 impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
     pub(super) fn warm_up(&mut self, motions: &Motions<N>) -> Result<(), A::Error> {
@@ -26,7 +26,9 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
                 duration_s: self.options.warm_up_s,
                 ..motions.first
             };
-            done = Some(self.motion("warm-up", &|from| follow(from, &[series], None))?);
+            let limits = self.limits;
+            let steps = |from: &Vector<N>| follow(&limits, from, &[series], None);
+            done = Some(self.motion("warm-up", &steps)?);
         }
         Ok(self.finish(StepName::WarmUp, before_s, done)?)
     }
@@ -93,7 +95,9 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         let before_s = self.progress.moved_s;
         self.ensure(stage)?;
         let detour = self.detour(stage)?;
-        let done = self.motion(name, &|from| follow(from, series, detour.as_ref()))?;
+        let limits = self.limits;
+        let steps = |from: &Vector<N>| follow(&limits, from, series, detour.as_ref());
+        let done = self.motion(name, &steps)?;
         Ok(self.finish(step, before_s, Some(done))?)
     }
 }

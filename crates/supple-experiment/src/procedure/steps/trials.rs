@@ -26,9 +26,9 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             ..Step::wait(Request::Float, FLOAT_S)
         };
         let start_rad = self.sinusoid_start()?.unwrap_or(self.home_rad);
-        let hold = move_to(&start_rad, &start_rad);
+        let hold = move_to(&self.limits, &start_rad, &start_rad);
         let from_rad = self.arm.position_rad()?;
-        let steps = [move_to(&start_rad, &from_rad), float, hold];
+        let steps = [move_to(&self.limits, &start_rad, &from_rad), float, hold];
         let performed = self.arm.perform("float", &steps)?;
         self.progress.moved_s += performed.moved_s;
         match performed.stopped {
@@ -87,7 +87,10 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
                 true => ("sinusoid-learning", LEARNING_S),
             };
             let from_rad = self.arm.position_rad()?;
-            let mut steps = vec![move_to(&start_rad, &from_rad), Step::wait(gains, GAINS_S)];
+            let mut steps = vec![
+                move_to(&self.limits, &start_rad, &from_rad),
+                Step::wait(gains, GAINS_S),
+            ];
             if learning {
                 let on = Request::Learning(LearningSwitch::On);
                 steps.push(Step::wait(on, GAINS_S));
@@ -127,8 +130,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             result.learned_model = Some(LEARNED_MODEL.to_owned());
         }
         self.progress.sinusoid = Some(result);
-        let home_rad = self.home_rad;
-        let done = self.motion("home", &|from| vec![move_to(&home_rad, from)])?;
+        let done = self.home("home")?;
         Ok(self.finish(StepName::Sinusoid, before_s, Some(done))?)
     }
 }
