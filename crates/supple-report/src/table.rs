@@ -26,7 +26,7 @@ pub fn arm_notes(summary: &Summary) -> Vec<String> {
     if let Some(derived) = &summary.derived {
         let worst_m = worst(&summary.perturbed_rms_m);
         lines.push(format!(
-            "this arm weighs {} at the tip: a model 0.1 % and 3 % off may cost {} at 5 N/m (15 mm up to 23 N, then in \
+            "the tip weight of this arm along the sinusoid is {} RMS: a model 0.1 % and 3 % off may cost {} at 5 N/m (15 mm up to 23 N, then in \
              proportion); worst here: {}",
             newtons(derived.tip_weight_n),
             mm(derived.allowed_error_m),

@@ -75,10 +75,12 @@ pub(super) fn add<const N: usize>(
     let against = (friction * shares.fold(0.0, f64::max)).clamp(min, max);
     let why = "one and a half times the largest share of a torque limit that dry friction has, at least 0.05";
     writer.set("plausible", "against_share", rounded(against), why);
-    let why = format!("5 % of the arm's weight at the tip at home, {weight_n:.0} N, at least 5 N");
+    let why = format!(
+        "5 % of the tip weight at home, {weight_n:.0} N, at least 5 N; it is the force at the tip that carries the arm"
+    );
     let load_n = rounded((LOAD.0 * weight_n).max(LOAD.1));
     writer.set("plausible", "load_n", load_n, &why);
-    let why = "2 % of the arm's weight at the tip at home, at least 3 N";
+    let why = "2 % of the tip weight at home, at least 3 N";
     let contact_n = rounded((CONTACT.0 * weight_n).max(CONTACT.1));
     writer.set("latch", "threshold_n", contact_n, why);
     let rows = jacobian(&config.arm, &home);

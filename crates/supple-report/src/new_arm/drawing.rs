@@ -12,8 +12,20 @@ const POSES: u32 = 1500;
 /// Width and height of a view, and its margin \[px\].
 const VIEW_PX: (f64, f64) = (380.0, 380.0);
 const MARGIN_PX: f64 = 30.0;
-/// Height of a joint's row \[px\].
+/// Height of a row of text, and width of a letter at most, of the font's 12 px \[px\].
 const ROW_PX: f64 = 22.0;
+const LETTER_PX: f64 = 7.0;
+/// Smallest length of the bar that is a joint's range \[px\].
+const BAR_PX: f64 = 160.0;
+/// Distance of text from the border and from what is beside it \[px\].
+const BORDER_PX: f64 = 20.0;
+const GAP_PX: f64 = 10.0;
+/// Colours of the workspace, the arm and its joints, the two paths, and the range and the angle at home of a joint.
+const WORKSPACE: &str = "#9db8d6";
+const ARM: &str = "#444444";
+const PATHS: [&str; 2] = ["#c03a2b", "#2b8a3e"];
+const RANGE: &str = "#cccccc";
+const HOME: &str = "#1f5fa8";
 /// Speed of the drawn quadrant \[m/s\].
 const SPEED_M_PER_S: f64 = 0.06;
 
@@ -47,12 +59,22 @@ pub fn svg<const N: usize>(arm: &Description) -> Result<String, Failure> {
         sampled(&sinusoid, 12.0),
         sampled(&Trajectory::Quadrant(quadrant), 0.5 * quadrant_s + 0.5),
     ];
-    let height = VIEW_PX.1 + 60.0 + ROW_PX * N as f64 + 20.0;
+    let rows = rows(arm, &config, &home);
+    let widths = [
+        |row: &Row| row.name.chars().count(),
+        |row: &Row| row.lower.chars().count(),
+        |row: &Row| row.upper.chars().count(),
+    ]
+    .map(|length| LETTER_PX * rows.iter().map(length).max().unwrap_or(0) as f64);
+    let beside = 2.0 * BORDER_PX + 3.0 * GAP_PX + widths.iter().sum::<f64>();
+    let width = (2.0 * VIEW_PX.0).max(beside + BAR_PX);
+    let (legend, legend_rows) = legend(width);
+    let first_row = VIEW_PX.1 + ROW_PX * (legend_rows as f64 + 1.0);
+    let height = first_row + ROW_PX * N as f64;
     let mut svg = format!(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{height}\" viewBox=\"0 0 {0} {height}\" \
-         font-family=\"sans-serif\" font-size=\"12\" role=\"img\" aria-label=\"home pose, workspace and joint limits of {1}\">\n\
-         <rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
-        2.0 * VIEW_PX.0,
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height}\" viewBox=\"0 0 {width} {height}\" \
+         font-family=\"sans-serif\" font-size=\"12\" fill=\"black\" role=\"img\" aria-label=\"home pose, workspace, paths and \
+         joint limits of {0}\">\n<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n",
         escaped(arm.name())
     );
     let side: View = |point, outward| (point.dot(outward), point.z);
@@ -61,7 +83,7 @@ pub fn svg<const N: usize>(arm: &Description) -> Result<String, Failure> {
         .iter()
         .enumerate()
     {
-        let origin = (index as f64 * VIEW_PX.0, 0.0);
+        let origin = ((index as f64 - 1.0) * VIEW_PX.0 + 0.5 * width, 0.0);
         let points = |list: &[Vector3<f64>]| -> Vec<(f64, f64)> {
             list.iter().map(|point| view(point, &outward)).collect()
         };
@@ -74,32 +96,119 @@ pub fn svg<const N: usize>(arm: &Description) -> Result<String, Failure> {
             &paths.each_ref().map(|path| points(path)),
         );
     }
-    let limits = &config.limits;
-    for (i, name) in arm.joint_names().iter().enumerate() {
-        let y = VIEW_PX.1 + 50.0 + ROW_PX * i as f64;
-        let (lower, upper) = (limits.position_lower_rad[i], limits.position_upper_rad[i]);
-        let x = |angle: f64| 260.0 + 320.0 * (angle - lower) / (upper - lower);
-        let role = match config.roles[i] {
-            supple_core::config::Role::Active => "active",
-            supple_core::config::Role::Held { .. } => "held",
-        };
+    svg.push_str(&legend);
+    let bar = (
+        BORDER_PX + widths[0] + widths[1] + 2.0 * GAP_PX,
+        width - beside,
+    );
+    for (row, y) in rows
+        .iter()
+        .zip((0..).map(|i| first_row + ROW_PX * f64::from(i)))
+    {
         let _ = writeln!(
             svg,
-            "<text x=\"20\" y=\"{0}\">{1} ({role})</text><text x=\"250\" y=\"{0}\" text-anchor=\"end\">{lower:.2}</text>\
-             <rect x=\"260\" y=\"{2}\" width=\"320\" height=\"6\" fill=\"#dddddd\"/>\
-             <circle cx=\"{3:.1}\" cy=\"{4}\" r=\"5\" fill=\"#1f5fa8\"/>\
-             <text x=\"590\" y=\"{0}\">{upper:.2} rad, {5} N m, {6} rad/s</text>",
-            y + 4.0,
-            escaped(name),
+            "<text x=\"{BORDER_PX}\" y=\"{text}\">{}</text><text x=\"{}\" y=\"{text}\" text-anchor=\"end\">{}</text>\
+             <rect x=\"{}\" y=\"{}\" width=\"{}\" height=\"6\" fill=\"{RANGE}\"/>\
+             <circle cx=\"{:.1}\" cy=\"{y}\" r=\"5\" fill=\"{HOME}\"/><text x=\"{}\" y=\"{text}\">{}</text>",
+            escaped(&row.name),
+            bar.0 - GAP_PX,
+            row.lower,
+            bar.0,
             y - 3.0,
-            x(home[i]),
-            y,
-            limits.joint_torque_nm[i],
-            limits.joint_speed_rad_per_s[i],
+            bar.1,
+            bar.0 + bar.1 * row.home_share,
+            bar.0 + bar.1 + GAP_PX,
+            row.upper,
+            text = y + 4.0,
         );
     }
     svg.push_str("</svg>\n");
     Ok(svg)
+}
+
+/// A joint's row.
+struct Row {
+    name: String,
+    lower: String,
+    upper: String,
+    /// Place of the angle at home between the limits.
+    home_share: f64,
+}
+
+fn rows<const N: usize>(
+    arm: &Description,
+    config: &supple_core::Config<N>,
+    home: &Vector<N>,
+) -> Vec<Row> {
+    let limits = &config.limits;
+    let row = |i: usize| {
+        let (lower, upper) = (limits.position_lower_rad[i], limits.position_upper_rad[i]);
+        let role = match config.roles[i] {
+            supple_core::config::Role::Active => "active",
+            supple_core::config::Role::Held { .. } => "held",
+        };
+        Row {
+            name: format!("{} ({role})", arm.joint_names()[i]),
+            lower: rounded(lower),
+            upper: format!(
+                "{} rad, {} N m, {} rad/s",
+                rounded(upper),
+                rounded(limits.joint_torque_nm[i]),
+                rounded(limits.joint_speed_rad_per_s[i])
+            ),
+            home_share: (home[i] - lower) / (upper - lower),
+        }
+    };
+    (0..N).map(row).collect()
+}
+
+/// The number with three significant digits or as an integer, without zeros at its end.
+fn rounded(value: f64) -> String {
+    let digits = 2.0 - value.abs().max(1e-3).log10().floor();
+    let text = format!("{value:.*}", digits.clamp(0.0, 5.0) as usize);
+    match text.contains('.') {
+        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        false => text,
+    }
+}
+
+/// What the signs mean, below the views in a drawing of this width, and the number of its rows.
+fn legend(width: f64) -> (String, usize) {
+    let line = |colour: &str| {
+        format!("<line x1=\"0\" x2=\"16\" stroke=\"{colour}\" stroke-width=\"2.5\"/>")
+    };
+    let dot =
+        |radius: u8, colour: &str| format!("<circle cx=\"8\" r=\"{radius}\" fill=\"{colour}\"/>");
+    let joint =
+        format!("<circle cx=\"8\" r=\"4\" fill=\"white\" stroke=\"{ARM}\" stroke-width=\"2\"/>");
+    let bar = format!("<rect y=\"-3\" width=\"16\" height=\"6\" fill=\"{RANGE}\"/>");
+    let signs = [
+        (line(ARM) + &joint, "arm and joints at home"),
+        (
+            dot(2, WORKSPACE),
+            "where the tip can be, held joints at rest",
+        ),
+        (line(PATHS[0]), "sinusoid"),
+        (line(PATHS[1]), "quadrant"),
+        (
+            bar + &dot(5, HOME),
+            "range of a joint, and its angle at home; limits of angle, torque and speed",
+        ),
+    ];
+    let (mut svg, mut x, mut row) = (String::new(), BORDER_PX, 0_usize);
+    for (sign, text) in signs {
+        let length = 16.0 + GAP_PX + LETTER_PX * text.len() as f64;
+        if x > BORDER_PX && x + length > width - BORDER_PX {
+            (x, row) = (BORDER_PX, row + 1);
+        }
+        let y = VIEW_PX.1 + ROW_PX * (row as f64 + 0.5);
+        let _ = writeln!(
+            svg,
+            "<g transform=\"translate({x} {y})\">{sign}<text x=\"22\" y=\"4\">{text}</text></g>"
+        );
+        x += length + GAP_PX;
+    }
+    (svg, row + 1)
 }
 
 fn sampled(trajectory: &Trajectory, duration_s: f64) -> Vec<Vector3<f64>> {
@@ -142,7 +251,7 @@ fn draw_view(
         let (x, y) = place(point);
         let _ = writeln!(
             svg,
-            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"1\" fill=\"#c9d7e8\"/>"
+            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"1\" fill=\"{WORKSPACE}\"/>"
         );
     }
     let line = |points: &[(f64, f64)], colour: &str, width: f64| {
@@ -156,14 +265,14 @@ fn draw_view(
             points.join(" ")
         )
     };
-    svg.push_str(&line(skeleton, "#444444", 5.0));
-    svg.push_str(&line(&paths[0], "#c03a2b", 2.5));
-    svg.push_str(&line(&paths[1], "#2b8a3e", 1.5));
+    svg.push_str(&line(skeleton, ARM, 5.0));
+    svg.push_str(&line(&paths[0], PATHS[0], 2.5));
+    svg.push_str(&line(&paths[1], PATHS[1], 2.0));
     for joint in skeleton {
         let (x, y) = place(joint);
         let _ = writeln!(
             svg,
-            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"white\" stroke=\"#444444\" stroke-width=\"2\"/>"
+            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"4\" fill=\"white\" stroke=\"{ARM}\" stroke-width=\"2\"/>"
         );
     }
     let _ = writeln!(
@@ -181,4 +290,40 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;")
         .replace('<', "&lt;")
         .replace('"', "&quot;")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{BORDER_PX, LETTER_PX, legend, rounded};
+
+    #[test]
+    fn numbers_have_three_significant_digits() {
+        for (value, text) in [
+            (0.628_318_53, "0.628"),
+            (-6.283_185, "-6.28"),
+            (12.0, "12"),
+            (0.0, "0"),
+            (149.96, "150"),
+            (1234.5, "1234"),
+        ] {
+            assert_eq!(rounded(value), text);
+        }
+    }
+
+    #[test]
+    fn the_legend_stays_within_the_drawing() {
+        for width in [760.0, 600.0] {
+            let (svg, rows) = legend(width);
+            assert!(rows > 1);
+            for group in svg.lines() {
+                let x = group.split("translate(").nth(1).expect("a place");
+                let x: f64 = x.split(' ').next().expect("x").parse().expect("a number");
+                let text = group.split("\">").last().expect("a text");
+                let letters = text.split('<').next().expect("a text").len();
+                let end = x + 22.0 + LETTER_PX * letters as f64;
+                assert!(end <= width, "{group}");
+                assert!(x >= BORDER_PX);
+            }
+        }
+    }
 }

@@ -263,7 +263,8 @@ fn text(summary: &Summary) -> String {
         1e3 * summary.max_error_m
     ));
     lines.push(format!(
-        "the arm weighs {:.0} N at the tip: each percent of error in its gravity model is {:.0} mm at 5 N/m",
+        "tip weight (the force at the tip that carries the arm) along the sinusoid: {:.0} N RMS; each percent of error in the \
+         gravity model is {:.0} mm at 5 N/m",
         summary.tip_weight_n,
         1e3 * 0.01 * summary.tip_weight_n / scenario::STIFFNESS_N_PER_M
     ));

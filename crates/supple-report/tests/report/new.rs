@@ -32,7 +32,14 @@ fn a_urdf_gives_an_arm_with_every_derived_setting_and_its_reason() {
         ["arm.svg", "arm.toml", "arm.urdf"].map(Path::new)
     );
     let drawing = read(&arm.join("arm.svg"));
-    assert!(roxmltree::Document::parse(&drawing).is_ok());
+    let document = roxmltree::Document::parse(&drawing).expect("XML");
+    let texts = document
+        .descendants()
+        .filter(|node| node.has_tag_name("text"));
+    let texts: Vec<&str> = texts.filter_map(|node| node.text()).collect();
+    for legend in ["arm and joints at home", "sinusoid", "quadrant"] {
+        assert!(texts.contains(&legend), "{legend} in {texts:?}");
+    }
     let summary: Value = serde_json::from_str(&answer.stdout).expect("JSON");
 
     // The text of the TOML has each setting; parsed, it has each value where the report states.
