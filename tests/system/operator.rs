@@ -159,6 +159,22 @@ fn idle_is_heard_without_its_socket() {
     wait_for_mode(&mut reader, Mode::Idle);
 }
 
+/// The arm of the running system is the default; another one is refused by its name.
+#[test]
+fn a_command_knows_the_arm_of_the_running_system() {
+    let up = Up::tracking(&["--plant", "sim", "--no-log", "--arm", "wam3"]);
+    let tracked = up.run(&["track", "arc"]);
+    assert!(tracked.status.success(), "{}", stderr_of(&tracked));
+    for command in [&["track", "arc"][..], &["probe"]] {
+        let other = up.run(&[command, &["--arm", "wam4"]].concat());
+        let words = stderr_of(&other);
+        assert_eq!(other.status.code(), Some(3), "{words}");
+        for part in ["has 4 joints", "running system 3", "--arm wam3"] {
+            assert!(words.contains(part), "{part}: {words}");
+        }
+    }
+}
+
 /// A program that cleans /tmp has removed the files through which the system is stopped: they are created anew.
 #[test]
 fn the_files_of_a_running_system_are_created_anew() {

@@ -38,6 +38,25 @@ pub fn find(name_or_path: &str, strict: bool) -> Result<Description, Failure> {
     })
 }
 
+/// The arm's name for a process in another folder: that of a built-in arm, or the absolute path of another one, with the tip
+/// of a URDF.
+pub fn absolute(name_or_path: &str) -> String {
+    let path = |path: &str| match Path::new(path).canonicalize() {
+        Ok(path) => path.display().to_string(),
+        Err(_) => path.to_owned(),
+    };
+    if assets().contains(&name_or_path) {
+        return name_or_path.to_owned();
+    }
+    match UrdfName::parse(name_or_path) {
+        Some(mut urdf) => {
+            urdf.path = path(&urdf.path);
+            urdf.to_text()
+        }
+        None => path(name_or_path),
+    }
+}
+
 /// Loads an arm from a file. Warnings as for [`find`].
 ///
 /// # Errors
@@ -162,4 +181,27 @@ fn list(as_json: bool) -> Result<(), Failure> {
         ))?;
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::absolute;
+
+    #[test]
+    fn an_absolute_name_keeps_the_tip() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let folder = folder.path().canonicalize().expect("there");
+        let file = folder.join("robot.urdf");
+        std::fs::write(&file, "<robot/>").expect("written");
+        let detour = folder.join(".").join("robot.urdf");
+        assert_eq!(
+            absolute(&format!("{}#hand,repair", detour.display())),
+            format!("{}#hand,repair", file.display())
+        );
+        assert_eq!(
+            absolute(&folder.join(".").display().to_string()),
+            folder.display().to_string()
+        );
+        assert_eq!(absolute("wam4"), "wam4");
+    }
 }

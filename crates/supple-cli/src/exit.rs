@@ -231,6 +231,19 @@ pub enum Failure {
         "--misbehave is for emulated Damiao motors: use --plant emu with an arm that has [bus], such as openarm or yam"
     )]
     MisbehaviourWithoutMotors,
+    /// The plant has no drives for this arm.
+    #[error(
+        "--plant {plant} has drives for a WAM with 4 or 7 joints and for arms with [bus] in their TOML; `{arm}` has {joints} joints \
+         and no [bus]: use --plant sim"
+    )]
+    NoDrivesForArm {
+        /// The plant.
+        plant: &'static str,
+        /// Name of the arm.
+        arm: String,
+        /// Its joints.
+        joints: usize,
+    },
     /// Options of a simulated arm were given for a real one.
     #[error(
         "--plant-options, --realistic, --block-m, --trace and --start-error work only with a simulated arm: use --plant sim or --plant emu"
@@ -325,7 +338,7 @@ pub enum Failure {
     NothingTaught,
     /// The running system has another arm.
     #[error(
-        "the arm {arm} has {joints} joints, that of the running system {running}: name its arm with --arm"
+        "the arm {arm} has {joints} joints, that of the running system {running}: name its arm with --arm {named}"
     )]
     OtherArm {
         /// Name of the given arm.
@@ -334,10 +347,23 @@ pub enum Failure {
         joints: usize,
         /// Joints of the running system.
         running: usize,
+        /// Name of its arm, if it is known.
+        named: String,
     },
     /// A log cannot be read or written.
     #[error(transparent)]
     Log(#[from] LogError),
+    /// The log has not its own name yet.
+    #[error(
+        "cannot read {}: it does not exist; its writer was killed or still writes {part}: read that file, or `supple log recover \
+         {part}`", log.display(), part = part.display()
+    )]
+    UnfinishedLog {
+        /// The log.
+        log: PathBuf,
+        /// What is written of it.
+        part: PathBuf,
+    },
     /// A replay differs from the logged run.
     #[error(
         "{different} of {steps} steps of {} differ from the logged outputs; the log was written by \
@@ -442,6 +468,7 @@ impl Failure {
             ErrorKind::InvalidInput | ErrorKind::IsADirectory => {
                 "name a regular file or a new file in an existing folder"
             }
+            _ if action == "read" => "name a file that exists and that this user may read",
             _ => "choose a writable folder with --out",
         };
         Failure::File {
@@ -503,6 +530,7 @@ impl Failure {
             Failure::Fault { .. } | Failure::RunFault { .. } | Failure::SystemInFault => 5,
             Failure::Log(error) => log_code(error),
             Failure::File { .. }
+            | Failure::UnfinishedLog { .. }
             | Failure::Exists { .. }
             | Failure::SameOutput { .. }
             | Failure::OutputInUse { .. }
@@ -517,7 +545,9 @@ impl Failure {
             | Failure::FaultTestOnRealArm
             | Failure::ValueCount { .. } => 2,
             Failure::Injection(_) | Failure::InjectionIntoRealArm => 2,
-            Failure::OptionsOfRealArm | Failure::MisbehaviourWithoutMotors => 2,
+            Failure::OptionsOfRealArm
+            | Failure::MisbehaviourWithoutMotors
+            | Failure::NoDrivesForArm { .. } => 2,
             Failure::HandNeedsMode | Failure::NoBus { .. } | Failure::NoSuchEffect { .. } => 2,
             Failure::PlantOptions(error) => plant_options_code(error),
             Failure::NoSuchProcess { .. } | Failure::NoSuchTestCase { .. } => 2,

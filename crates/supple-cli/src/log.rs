@@ -102,12 +102,10 @@ fn failure(file: &Path, error: LogError) -> Failure {
     if file.exists() || !part.exists() {
         return error.into();
     }
-    let why = format!(
-        "it does not exist; its writer was killed or still writes {}: read that file, or `supple log recover {}`",
-        part.display(),
-        part.display()
-    );
-    Failure::file("read", file, std::io::Error::new(ErrorKind::NotFound, why))
+    Failure::UnfinishedLog {
+        log: file.to_owned(),
+        part,
+    }
 }
 
 fn export_to_stdout(file: &Path, channel: &str, every: NonZeroU64) -> Result<(), Failure> {

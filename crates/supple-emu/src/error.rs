@@ -10,7 +10,8 @@ use supple_realtime::StopError;
 pub enum EmulatorError {
     /// The arm has neither 4 nor 7 movable joints.
     #[error(
-        "the arm has {found} movable joints, but the emulator has pucks for 4 or 7 only: use wam4 or wam7"
+        "the arm has {found} movable joints and no [bus]: the emulator has pucks for a WAM with 4 or 7 joints, and Damiao motors \
+         for an arm with [bus] in its TOML; any other arm can be simulated, `supple up --plant sim`"
     )]
     Joints {
         /// Joints found.

@@ -51,9 +51,9 @@ pub enum Command {
     Play(PlayArgs),
     /// Make a running system probe for contact; the arm moves to the start first.
     Probe {
-        /// The arm of the running system.
-        #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
-        arm: String,
+        /// The arm of the running system. Default: the one that its `supple up` was given, else wam4.
+        #[arg(long, value_name = "NAME|PATH")]
+        arm: Option<String>,
         /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
         #[arg(long)]
         strict: bool,
@@ -517,9 +517,9 @@ pub struct PlayArgs {
     /// Speed relative to the recording. Where a limit needs it, the motion is slower.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = between(0.1, 10.0))]
     pub speed: f64,
-    /// The arm of the running system.
-    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
-    pub arm: String,
+    /// The arm of the running system. Default: the one that its `supple up` was given, else wam4.
+    #[arg(long, value_name = "NAME|PATH")]
+    pub arm: Option<String>,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
@@ -552,9 +552,9 @@ pub struct TrackArgs {
     /// acceleration, the most.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = between(1e-6, 1e6))]
     pub speed: f64,
-    /// The arm of the running system.
-    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
-    pub arm: String,
+    /// The arm of the running system. Default: the one that its `supple up` was given, else wam4.
+    #[arg(long, value_name = "NAME|PATH")]
+    pub arm: Option<String>,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,

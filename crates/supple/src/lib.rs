@@ -68,7 +68,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
             strict,
             urdf,
             system,
-        } => operate::probe(&urdf.name(arm), *strict, system),
+        } => operate::probe(arm.as_deref(), urdf, *strict, system),
         Command::Pendant { action, system } => operate::pendant(*action, system.prefix.as_deref()),
         Command::AtHome(args) => operate::at_home(args),
         Command::Reset(system) => operate::reset(system),

@@ -1,5 +1,6 @@
 //! `supple view`: the live page, see `supple_view`.
 
+use crate::operate::arm_of;
 use clap::Args;
 use std::path::{Path, PathBuf};
 use supple_cli::arguments::UrdfArgs;
@@ -21,14 +22,9 @@ pub struct ViewArgs {
     /// Prefix of the system. Default: SUPPLE_PREFIX or `supple`.
     #[arg(long, value_name = "NAME", conflicts_with = "log")]
     pub prefix: Option<String>,
-    /// The arm of the running system. A log contains its arm.
-    #[arg(
-        long,
-        value_name = "NAME|PATH",
-        default_value = "wam4",
-        conflicts_with = "log"
-    )]
-    pub arm: String,
+    /// The arm of the running system. Default: the one that its `supple up` was given, else wam4. A log contains its arm.
+    #[arg(long, value_name = "NAME|PATH", conflicts_with = "log")]
+    pub arm: Option<String>,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
@@ -72,10 +68,14 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
     let stop = interrupt::shutdown_on_interrupt();
     let source = match &args.log {
         Some(log) => Source::Log(log.clone()),
-        None => Source::System {
-            domain: Box::new(Domain::new(args.prefix.as_deref()).map_err(Failure::system)?),
-            description: Box::new(arms::find(&args.urdf.name(&args.arm), args.strict)?),
-        },
+        None => {
+            let domain = Domain::new(args.prefix.as_deref()).map_err(Failure::system)?;
+            let arm = arm_of(&domain, args.arm.as_deref(), &args.urdf);
+            Source::System {
+                domain: Box::new(domain),
+                description: Box::new(arms::find(&arm, args.strict)?),
+            }
+        }
     };
     let options = Options {
         block_m: args.block_m,

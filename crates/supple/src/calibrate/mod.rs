@@ -12,7 +12,7 @@ use running_arm::RunningArm;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use supple_bus::Address;
-use supple_cli::arguments::{CalibrateArgs, CalibrationPlant, PlantArgs};
+use supple_cli::arguments::{CalibrateArgs, CalibrationPlant, PlantArgs, UrdfArgs};
 use supple_cli::arms;
 use supple_cli::console::{print_status, write_stderr_in_background};
 use supple_cli::exit::Failure;
@@ -82,7 +82,9 @@ fn sized<const N: usize>(
     }
     let up = up_args(arm, args, on)?;
     let starts = on != CalibrationPlant::Running;
-    let _pidfile = starts.then(|| Pidfile::create(&domain)).transpose()?;
+    let _pidfile = starts
+        .then(|| Pidfile::create(&domain, &up.arm))
+        .transpose()?;
     let mut running = RunningArm::<N>::new(&up, starts, arm, &domain, &args.out, stop)?;
     let result = calibrate_arm(&mut running, &start, &options, &mut terminal);
     let ended = running.end();
@@ -174,8 +176,8 @@ fn up_args(
             CalibrationPlant::Can => PlantKind::Can,
             _ => PlantKind::Sim,
         },
-        arm: absolute(&args.arm),
-        urdf: args.urdf.clone(),
+        arm: arms::absolute(&args.urdf.name(&args.arm)),
+        urdf: UrdfArgs::default(),
         strict: args.strict,
         track: UpTrajectory::Sinusoid,
         bus: bus.map_err(Failure::system)?,
@@ -211,7 +213,7 @@ fn seeded(arm: &Description, args: &CalibrateArgs) -> Result<PlantArgs, Failure>
     };
     let Some(set) = set.filter(|_| options.seed.is_none()) else {
         return Ok(PlantArgs {
-            plant_options: file.map(|file| PathBuf::from(absolute(&file.display().to_string()))),
+            plant_options: file.map(|file| absolute(file)),
             ..args.plant.clone()
         });
     };
@@ -220,15 +222,12 @@ fn seeded(arm: &Description, args: &CalibrateArgs) -> Result<PlantArgs, Failure>
     supple_files::write_atomic(&file, text.as_bytes())
         .map_err(|error| Failure::file("write", &file, error))?;
     Ok(PlantArgs {
-        plant_options: Some(PathBuf::from(absolute(&file.display().to_string()))),
+        plant_options: Some(absolute(&file)),
         realistic: false,
     })
 }
 
-/// The name of a built-in arm, or the path of another one.
-fn absolute(arm: &str) -> String {
-    match Path::new(arm).canonicalize() {
-        Ok(path) => path.display().to_string(),
-        Err(_) => arm.to_owned(),
-    }
+/// The absolute path of a file; the name of a built-in set as it is.
+fn absolute(file: &Path) -> PathBuf {
+    file.canonicalize().unwrap_or_else(|_| file.to_owned())
 }

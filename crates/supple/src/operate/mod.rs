@@ -27,10 +27,11 @@ use crate::cli::{
     GainsArgs, ModeArgs, ModeName, SystemArgs, TrackArgs, TrackTarget, TrackTrajectory,
     UpTrajectory,
 };
-use crate::up::stop_running;
+use crate::up::{running_arm, stop_running};
 use core::time::Duration;
 use serde::Serialize;
 use std::time::Instant;
+use supple_cli::arguments::UrdfArgs;
 use supple_cli::arms;
 use supple_cli::console::{print_json, print_status};
 use supple_cli::exit::Failure;
@@ -43,6 +44,9 @@ use supple_realtime::pause;
 
 /// Cap radius of an arm without a tool \[m\].
 const CAP_M: f64 = 0.02;
+
+/// Arm of a system that no `supple up` runs: the default of its processes.
+const DEFAULT_ARM: &str = "wam4";
 
 /// Interval at which the pidfile of a running system is looked for.
 const PIDFILE_INTERVAL: Duration = Duration::from_millis(20);
@@ -171,13 +175,14 @@ pub fn trajectory_for(trajectory: UpTrajectory, description: &Description) -> (T
 /// # Errors
 /// [`Failure`].
 pub fn track(args: &TrackArgs) -> Result<(), Failure> {
+    let arm = || arm_of_system(&args.system, args.arm.as_deref(), &args.urdf);
     let trajectory = match &args.trajectory {
         TrackTarget::Named(trajectory) => *trajectory,
         TrackTarget::File(file) => {
             return teaching::perform(&teaching::Performance {
                 file,
                 speed: args.speed,
-                arm: &args.urdf.name(&args.arm),
+                arm: &arm()?,
                 strict: args.strict,
                 stiffness: &[],
                 damping: &[],
@@ -192,7 +197,8 @@ pub fn track(args: &TrackArgs) -> Result<(), Failure> {
     if trajectory == TrackTrajectory::Pose {
         return ask(&args.system, &SystemRequest::Pose(args));
     }
-    let description = arms::find(&args.urdf.name(&args.arm), args.strict)?;
+    let arm = arm()?;
+    let description = arms::find(&arm, args.strict)?;
     let paths = description.paths();
     let (trajectory, duration_s) = match trajectory {
         TrackTrajectory::Pose => return ask(&args.system, &SystemRequest::Pose(args)),
@@ -204,21 +210,65 @@ pub fn track(args: &TrackArgs) -> Result<(), Failure> {
             (Trajectory::Quadrant(quadrant), duration_s)
         }
     };
-    follow(&args.system, &description, trajectory, duration_s)
+    follow(&args.system, &arm, &description, trajectory, duration_s)
 }
 
 /// Runs `supple probe`: moves the arm to the start of the probing cycle and runs it.
 ///
 /// # Errors
 /// [`Failure`].
-pub fn probe(arm: &str, strict: bool, system: &SystemArgs) -> Result<(), Failure> {
-    let description = arms::find(arm, strict)?;
+pub fn probe(
+    arm: Option<&str>,
+    urdf: &UrdfArgs,
+    strict: bool,
+    system: &SystemArgs,
+) -> Result<(), Failure> {
+    let arm = arm_of_system(system, arm, urdf)?;
+    let description = arms::find(&arm, strict)?;
     let (trajectory, duration_s) = trajectory_for(UpTrajectory::Probe, &description);
-    follow(system, &description, trajectory, duration_s)
+    follow(system, &arm, &description, trajectory, duration_s)
+}
+
+/// The arm that a command of a running system is for: the given one, or that of its `supple up`.
+pub fn arm_of(domain: &Domain, given: Option<&str>, urdf: &UrdfArgs) -> String {
+    let of_system = || running_arm(domain).unwrap_or_else(|| DEFAULT_ARM.to_owned());
+    urdf.name(&given.map_or_else(of_system, str::to_owned))
+}
+
+fn arm_of_system(
+    system: &SystemArgs,
+    given: Option<&str>,
+    urdf: &UrdfArgs,
+) -> Result<String, Failure> {
+    let domain = Domain::new(system.prefix.as_deref()).map_err(Failure::system)?;
+    Ok(arm_of(&domain, given, urdf))
+}
+
+/// Whether the arm can be that of the running system.
+///
+/// # Errors
+/// [`Failure::OtherArm`] with the name of its arm, if it is known.
+fn check_arm(
+    domain: &Domain,
+    arm: &str,
+    description: &Description,
+    telemetry: &Telemetry,
+) -> Result<(), Failure> {
+    let running = usize::from(telemetry.state.dof);
+    if running == description.dof() {
+        return Ok(());
+    }
+    Err(Failure::OtherArm {
+        arm: arm.to_owned(),
+        joints: description.dof(),
+        running,
+        named: running_arm(domain).unwrap_or_else(|| "NAME".to_owned()),
+    })
 }
 
 fn follow(
     system: &SystemArgs,
+    arm: &str,
     description: &Description,
     trajectory: Trajectory,
     duration_s: f64,
@@ -237,6 +287,7 @@ fn follow(
         session.wait_for_all(approach.longest_wait(&position.into()))
     }
     let (domain, _reader, telemetry) = running(system)?;
+    check_arm(&domain, arm, description, &telemetry)?;
     let reply = with_dof!(description.dof(), N => sized::<N>(
         &domain, &telemetry, description, trajectory, duration_s
     ))??;

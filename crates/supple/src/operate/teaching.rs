@@ -4,7 +4,7 @@
 //! machine's load is in the motion. If this process ends, the reference comes to rest behind the last of them.
 
 use super::ask::{print_mode, running};
-use super::{Approach, OperatorSession};
+use super::{Approach, OperatorSession, arm_of_system, check_arm};
 use crate::cli::{PlayArgs, SystemArgs, TeachArgs};
 use core::time::Duration;
 use serde::Serialize;
@@ -209,7 +209,7 @@ pub fn play(args: &PlayArgs) -> Result<(), Failure> {
     perform(&Performance {
         file: &args.file,
         speed: args.speed,
-        arm: &args.urdf.name(&args.arm),
+        arm: &arm_of_system(&args.system, args.arm.as_deref(), &args.urdf)?,
         strict: args.strict,
         stiffness: &args.stiffness,
         damping: &args.damping,
@@ -225,15 +225,8 @@ pub fn perform(performance: &Performance<'_>) -> Result<(), Failure> {
     let description = arms::find(performance.arm, performance.strict)?;
     let points = read_points(performance.file).map_err(|error| Failure::Points(Box::new(error)))?;
     let (domain, mut reader, telemetry) = running(performance.system)?;
-    let found = usize::from(telemetry.state.dof);
-    if found != description.dof() {
-        return Err(Failure::OtherArm {
-            arm: performance.arm.to_owned(),
-            joints: description.dof(),
-            running: found,
-        });
-    }
-    with_dof!(found, N => perform_sized::<N>(
+    check_arm(&domain, performance.arm, &description, &telemetry)?;
+    with_dof!(description.dof(), N => perform_sized::<N>(
         performance, &description, &points, &domain, &mut reader, &telemetry
     ))?
 }

@@ -222,20 +222,22 @@ fn ended(name: &'static str, status: ExitStatus) -> Failure {
     }
 }
 
-/// File with the PID of the process that runs the system, for `supple stop`; a lock on it excludes a second process.
+/// File with the PID of the process that runs the system, for `supple stop`, and in its second line the system's arm; a lock
+/// on it excludes a second process.
 #[derive(Debug)]
 pub struct Pidfile {
     domain: Domain,
+    arm: String,
     path: PathBuf,
     locked: File,
 }
 
 impl Pidfile {
-    /// Creates and locks the file for a system that this process runs.
+    /// Creates and locks the file for a system that this process runs with the arm of this name.
     ///
     /// # Errors
     /// [`Failure::AlreadyRunning`], [`Failure::File`].
-    pub fn create(domain: &Domain) -> Result<Pidfile, Failure> {
+    pub fn create(domain: &Domain, arm: &str) -> Result<Pidfile, Failure> {
         let path = pidfile_path(domain);
         let failed = |error: io::Error| Failure::file("write", &path, error);
         let start = Instant::now();
@@ -252,9 +254,8 @@ impl Pidfile {
                 Err(Errno::WOULDBLOCK) => {
                     return Err(Failure::AlreadyRunning {
                         prefix: domain.prefix().to_owned(),
-                        process: fs::read_to_string(&path)
-                            .ok()
-                            .and_then(|text| text.trim().parse().ok())
+                        process: first_line(&path)
+                            .and_then(|line| line.parse().ok())
                             .unwrap_or_default(),
                     });
                 }
@@ -267,10 +268,11 @@ impl Pidfile {
                 continue;
             }
             file.set_len(0).map_err(failed)?;
-            file.write_all(std::process::id().to_string().as_bytes())
+            file.write_all(format!("{}\n{arm}\n", std::process::id()).as_bytes())
                 .map_err(failed)?;
             return Ok(Pidfile {
                 domain: domain.clone(),
+                arm: arm.to_owned(),
                 path,
                 locked: file,
             });
@@ -284,7 +286,7 @@ impl Pidfile {
     pub fn restore(&mut self) {
         let is_gone = |error: io::Error| error.kind() == io::ErrorKind::NotFound;
         if fs::symlink_metadata(&self.path).is_err_and(is_gone)
-            && let Ok(mut anew) = Pidfile::create(&self.domain)
+            && let Ok(mut anew) = Pidfile::create(&self.domain, &self.arm)
         {
             // The old lock ends with `anew`, which must not remove the file.
             std::mem::swap(&mut self.locked, &mut anew.locked);
@@ -318,12 +320,25 @@ pub fn stop_running(domain: &Domain) -> Result<bool, Failure> {
         .map_err(|error| Failure::file("end the process of", &path, error.into()))
 }
 
+/// Name of the arm of a running system, as `--arm` takes it; `None` if no `supple up` runs it.
+pub fn running_arm(domain: &Domain) -> Option<String> {
+    let path = pidfile_path(domain);
+    running(&path)?;
+    let text = fs::read_to_string(path).ok()?;
+    text.lines().nth(1).map(str::to_owned)
+}
+
 /// PID of the running `supple up` named by the file; `None` if the PID now belongs to another program.
 fn running(path: &Path) -> Option<Pid> {
-    let text = fs::read_to_string(path).ok()?;
-    let process = Pid::from_raw(text.trim().parse().ok()?)?;
-    let name = fs::read_to_string(format!("/proc/{}/comm", text.trim())).ok()?;
+    let line = first_line(path)?;
+    let process = Pid::from_raw(line.parse().ok()?)?;
+    let name = fs::read_to_string(format!("/proc/{line}/comm")).ok()?;
     (name.trim() == "supple").then_some(process)
+}
+
+fn first_line(path: &Path) -> Option<String> {
+    let text = fs::read_to_string(path).ok()?;
+    text.lines().next().map(|line| line.trim().to_owned())
 }
 
 #[cfg(test)]
@@ -334,13 +349,13 @@ mod tests {
     fn a_removed_pidfile_is_created_anew_and_locked() {
         let folder = tempfile::tempdir().expect("a folder");
         let domain = Domain::in_folder(&folder.path().join("run"), "pid").expect("a domain");
-        let mut pidfile = Pidfile::create(&domain).expect("created");
+        let mut pidfile = Pidfile::create(&domain, "my arm").expect("created");
         let path = pidfile_path(&domain);
         fs::remove_file(&path).expect("removed");
         pidfile.restore();
         let text = fs::read_to_string(&path).expect("there again");
-        assert_eq!(text, std::process::id().to_string());
-        let second = Pidfile::create(&domain);
+        assert_eq!(text, format!("{}\nmy arm\n", std::process::id()));
+        let second = Pidfile::create(&domain, "wam4");
         assert!(matches!(second, Err(Failure::AlreadyRunning { .. })));
         drop(pidfile);
         assert!(!path.exists());

@@ -17,7 +17,7 @@ mod status_line;
 mod system;
 mod viewer;
 
-pub use children::{ChildProcesses, Pidfile, stop_running};
+pub use children::{ChildProcesses, Pidfile, running_arm, stop_running};
 pub use plan::{CONTROLLER, Plan, SHUTDOWN_TIMEOUT};
 pub use recorder::Recorder;
 pub use start_up::{GRAVITY_HOLD_S, START_S};
@@ -40,9 +40,9 @@ use viewer::Viewer;
 /// # Errors
 /// [`Failure`]; [`Failure::RunFault`] after the system is shut down and everything is written.
 pub fn run(args: &UpArgs) -> Result<(), Failure> {
-    // The other processes get the arm's name with its tip.
+    // The other processes get the arm's name with its tip; commands in other folders find it.
     let args = &UpArgs {
-        arm: args.urdf.name(&args.arm),
+        arm: arms::absolute(&args.urdf.name(&args.arm)),
         ..args.clone()
     };
     let description = args.at_rate(arms::find(&args.arm, args.strict)?)?;
@@ -71,7 +71,7 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     let domain = Domain::new(args.prefix.as_deref()).map_err(Failure::system)?;
     write_stderr_in_background();
     let stop = interrupt::shutdown_on_interrupt();
-    let mut pidfile = Pidfile::create(&domain)?;
+    let mut pidfile = Pidfile::create(&domain, &args.arm)?;
     let mut system = System::<N>::new(args, description, &domain)?;
     let started = system.start(description);
     let viewer = match (&started, args.view) {

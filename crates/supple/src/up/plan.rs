@@ -15,6 +15,8 @@ use supple_plant::{Grip, Injection};
 pub const CONTROLLER: &str = "supple-rt";
 /// Default bus of a real arm.
 const INTERFACE: &str = "can0";
+/// Numbers of joints of a WAM, whose drives need no `[bus]`.
+const WAM_JOINTS: [usize; 2] = [4, 7];
 
 /// A program with its arguments.
 #[derive(Clone, Debug)]
@@ -64,7 +66,7 @@ impl Plan {
     /// # Errors
     /// Options that this plant does not support: [`Failure::Injection`], [`Failure::InjectionIntoRealArm`],
     /// [`Failure::MisbehaviourWithoutMotors`], [`Failure::OptionsOfRealArm`], [`Failure::NoBus`], [`Failure::HandNeedsMode`],
-    /// [`Failure::VirtualTimeOnRealBus`]; [`Failure::System`] if the folder of an emulated bus does not belong to this user.
+    /// [`Failure::NoDrivesForArm`], [`Failure::VirtualTimeOnRealBus`]; [`Failure::System`] if the folder of an emulated bus does not belong to this user.
     pub fn new(
         args: &UpArgs,
         description: &Description,
@@ -72,6 +74,7 @@ impl Plan {
         cycles: Option<u64>,
     ) -> Result<Plan, Failure> {
         args.check_injections()?;
+        args.check_drives(description)?;
         let emulates_motors_on_bus = args.plant == PlantKind::Emu && description.bus().is_some();
         if !args.misbehave.is_empty() && !emulates_motors_on_bus {
             return Err(Failure::MisbehaviourWithoutMotors);
@@ -255,6 +258,24 @@ impl UpArgs {
             arguments.extend(["--inject".to_owned(), injection.to_string()]);
         }
         arguments
+    }
+
+    /// Plants on a bus have drives for some arms only.
+    fn check_drives(&self, description: &Description) -> Result<(), Failure> {
+        let plant = match self.plant {
+            PlantKind::Sim => return Ok(()),
+            PlantKind::Emu => "emu",
+            PlantKind::Can => "can",
+        };
+        let joints = description.dof();
+        match description.bus() {
+            None if !WAM_JOINTS.contains(&joints) => Err(Failure::NoDrivesForArm {
+                plant,
+                arm: description.name().to_owned(),
+                joints,
+            }),
+            _ => Ok(()),
+        }
     }
 
     fn check_injections(&self) -> Result<(), Failure> {

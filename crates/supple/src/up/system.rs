@@ -343,7 +343,11 @@ impl<'a, const N: usize> System<'a, N> {
                     }
                 }
                 // A plant that has crashed cannot report events; the log is complete without them.
-                Err(failure) => print_status(&format!("the log contains no arm events: {failure}")),
+                Err(failure) if self.seen.is_some() => {
+                    print_status(&format!("the log contains no arm events: {failure}"));
+                }
+                // Nor can one that did not start, whose own failure says more.
+                Err(_) => {}
             }
         }
         let arm = match &self.plan.arm {

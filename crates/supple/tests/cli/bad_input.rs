@@ -140,8 +140,41 @@ fn a_log_whose_writer_was_killed_is_found_beside_its_name() {
         let answer = run_in(folder.path(), &["log", command, "run.mcap"]);
         let words = ["run.mcap.part", "supple log recover"];
         assert_one_clear_line(&answer, &words);
+        assert!(!answer.stderr.contains("--out"), "{}", answer.stderr);
         assert_eq!(answer.code, Some(6), "{command}: {}", answer.stderr);
     }
+}
+
+/// A plant on a bus has no drives for this arm: no process starts.
+#[test]
+fn an_arm_without_drives_is_sent_to_the_simulation() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for plant in ["emu", "can"] {
+        let command = ["up", "--plant", plant, "--arm", "wam3", "--no-log"];
+        let answer = run_in(folder.path(), &command);
+        assert_eq!(answer.code, Some(2), "{plant}: {}", answer.stderr);
+        assert_one_clear_line(&answer, &["`wam3` has 3 joints", "--plant sim"]);
+    }
+}
+
+/// A URDF without a tip: the tip that is taken is named once.
+#[test]
+fn the_default_tip_is_named_once() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let built_in = Description::asset("wam4").expect("built in");
+    fs::write(folder.path().join("robot.urdf"), built_in.urdf()).expect("written");
+    let track = ["track", "sinusoid", "--arm", "robot.urdf"];
+    let answer = run_in(folder.path(), &track);
+    assert_eq!(answer.code, Some(10), "{}", answer.stderr);
+    let warning = "the tip: no link is named as the tip";
+    assert_eq!(
+        answer.stderr.matches(warning).count(),
+        1,
+        "{}",
+        answer.stderr
+    );
+    let answer = run_in(folder.path(), &[&track[..], &["--tip", "tip"]].concat());
+    assert!(!answer.stderr.contains(warning), "{}", answer.stderr);
 }
 
 /// The tip of a URDF can be named wherever the arm can.

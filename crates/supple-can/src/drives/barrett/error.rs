@@ -33,7 +33,8 @@ pub enum CanError {
     Model(#[from] ModelError),
     /// An arm that is not a WAM with 4 or 7 joints.
     #[error(
-        "arm `{arm}` has {found} moving joints, a WAM has 4 or 7 motor pucks: give such an arm"
+        "arm `{arm}` has {found} moving joints, a WAM has 4 or 7 motor pucks: give such an arm, or one with [bus] in its TOML; any other arm can \
+         be simulated, `supple up --plant sim`"
     )]
     Joints {
         /// Name of the arm.
