@@ -236,9 +236,10 @@ fn gripper_urdf(folder: &std::path::Path, last: &str) -> UrdfName {
         ("grip", last, "hand", "finger"),
         ("plate", "fixed", "hand", "flange"),
     ] {
+        let axis = if name == "shoulder" { "0 0 1" } else { "0 1 0" };
         urdf += &format!(
             "<joint name=\"{name}\" type=\"{kind}\"><origin xyz=\"0 0 0.3\"/><parent link=\"{parent}\"/><child \
-             link=\"{child}\"/><axis xyz=\"0 1 0\"/><limit lower=\"-2\" upper=\"2\" effort=\"20\" velocity=\"2\"/></joint>"
+             link=\"{child}\"/><axis xyz=\"{axis}\"/><limit lower=\"-2\" upper=\"2\" effort=\"20\" velocity=\"2\"/></joint>"
         );
     }
     let path = folder.join("gripper.urdf");

@@ -3,6 +3,7 @@
 //! The controller checks every request; the command prints its reply.
 
 mod approach;
+mod arm;
 mod ask;
 mod at_home;
 mod learning;
@@ -11,11 +12,13 @@ mod session;
 mod status;
 mod teaching;
 
+use arm::{arm_of_system, check_arm};
 use ask::{
     SystemRequest, TELEMETRY_TIMEOUT, ask, axes, print_mode, print_reply, running, value_count,
 };
 
 pub use approach::Approach;
+pub use arm::arm_of;
 pub use at_home::at_home;
 pub use learning::learning;
 pub use pendant::{Pendant, pendant};
@@ -27,7 +30,7 @@ use crate::cli::{
     GainsArgs, ModeArgs, ModeName, SystemArgs, TrackArgs, TrackTarget, TrackTrajectory,
     UpTrajectory,
 };
-use crate::up::{running_arm, stop_running};
+use crate::up::stop_running;
 use core::time::Duration;
 use serde::Serialize;
 use std::time::Instant;
@@ -44,9 +47,6 @@ use supple_realtime::pause;
 
 /// Cap radius of an arm without a tool \[m\].
 const CAP_M: f64 = 0.02;
-
-/// Arm of a system that no `supple up` runs: the default of its processes.
-const DEFAULT_ARM: &str = "wam4";
 
 /// Interval at which the pidfile of a running system is looked for.
 const PIDFILE_INTERVAL: Duration = Duration::from_millis(20);
@@ -227,43 +227,6 @@ pub fn probe(
     let description = arms::find(&arm, strict)?;
     let (trajectory, duration_s) = trajectory_for(UpTrajectory::Probe, &description);
     follow(system, &arm, &description, trajectory, duration_s)
-}
-
-/// The arm that a command of a running system is for: the given one, or that of its `supple up`.
-pub fn arm_of(domain: &Domain, given: Option<&str>, urdf: &UrdfArgs) -> String {
-    let of_system = || running_arm(domain).unwrap_or_else(|| DEFAULT_ARM.to_owned());
-    urdf.name(&given.map_or_else(of_system, str::to_owned))
-}
-
-fn arm_of_system(
-    system: &SystemArgs,
-    given: Option<&str>,
-    urdf: &UrdfArgs,
-) -> Result<String, Failure> {
-    let domain = Domain::new(system.prefix.as_deref()).map_err(Failure::system)?;
-    Ok(arm_of(&domain, given, urdf))
-}
-
-/// Whether the arm can be that of the running system.
-///
-/// # Errors
-/// [`Failure::OtherArm`] with the name of its arm, if it is known.
-fn check_arm(
-    domain: &Domain,
-    arm: &str,
-    description: &Description,
-    telemetry: &Telemetry,
-) -> Result<(), Failure> {
-    let running = usize::from(telemetry.state.dof);
-    if running == description.dof() {
-        return Ok(());
-    }
-    Err(Failure::OtherArm {
-        arm: arm.to_owned(),
-        joints: description.dof(),
-        running,
-        named: running_arm(domain).unwrap_or_else(|| "NAME".to_owned()),
-    })
 }
 
 fn follow(

@@ -3,8 +3,9 @@
 //! A motion is repeated as set-points that wait in the controller for their cycle, so that neither this process nor the
 //! machine's load is in the motion. If this process ends, the reference comes to rest behind the last of them.
 
+use super::arm::{arm_of_system, check_arm};
 use super::ask::{print_mode, running};
-use super::{Approach, OperatorSession, arm_of_system, check_arm};
+use super::{Approach, OperatorSession};
 use crate::cli::{PlayArgs, SystemArgs, TeachArgs};
 use core::time::Duration;
 use serde::Serialize;
