@@ -213,7 +213,7 @@ fn seeded(arm: &Description, args: &CalibrateArgs) -> Result<PlantArgs, Failure>
     };
     let Some(set) = set.filter(|_| options.seed.is_none()) else {
         return Ok(PlantArgs {
-            plant_options: file.map(|file| absolute(file)),
+            plant_options: file.map(absolute),
             ..args.plant.clone()
         });
     };
