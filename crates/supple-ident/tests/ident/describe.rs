@@ -53,7 +53,7 @@ fn a_saved_fit_is_loaded_as_the_same_arm() {
 }
 
 #[test]
-fn a_collision_threshold_is_three_residuals_and_two_breakaway_torques() {
+fn a_collision_threshold_is_three_residuals_two_breakaway_torques_and_a_share_of_the_limit() {
     let description = Description::asset("wam4").unwrap();
     let arm = description.arm::<4>().unwrap();
     let joints = [0, 1, 3];
@@ -74,7 +74,15 @@ fn a_collision_threshold_is_three_residuals_and_two_breakaway_torques() {
         found.move_collision_nm(&logs, &config)
     };
     // Every joint breaks away at 0.5 N m.
-    let expected_nm = [Some(1.0), Some(3.0 * 2.0 + 1.0), None, Some(1.0)];
+    let limits_nm = description.config::<4>().unwrap().limits.joint_torque_nm;
+    let expected_nm =
+        |residual_nm: f64, joint: usize| 3.0 * residual_nm + 1.0 + 0.005 * limits_nm[joint];
+    let expected_nm = [
+        Some(expected_nm(0.0, 0)),
+        Some(expected_nm(2.0, 1)),
+        None,
+        Some(expected_nm(0.0, 3)),
+    ];
     for (found_nm, expected_nm) in thresholds_nm(100.0).iter().zip(expected_nm) {
         match (found_nm, expected_nm) {
             (Some(found_nm), Some(nm)) => assert!((found_nm - nm).abs() < 0.1, "{found_nm} {nm}"),
