@@ -13,6 +13,8 @@ const MIN_FROZEN_S: f64 = 0.1;
 const REFRESHES_PER_PERIOD: f64 = 6.0;
 /// Minimum ratio of a step, equal for all joints, to its neighbours at which samples were lost.
 const MIN_LOST_RATIO: f64 = 1.6;
+/// Minimum ratio of the speed of a joint to what its speed changes from step to step, at which lost samples are looked for.
+const SPEED_TO_NOISE: f64 = 5.0;
 
 pub(super) fn check(log: &Log, moving: &[usize], cutoff_hz: f64) -> Vec<Finding> {
     let steps: Vec<f64> = log.t_s.windows(2).map(|w| w[1] - w[0]).collect();
@@ -308,12 +310,20 @@ fn lost_samples(log: &Log, moving: &[usize], step_s: f64) -> Option<Finding> {
         let mut ratios = Vec::new();
         let mut leaps = 0;
         for (row, &j) in moving.iter().enumerate() {
+            let speed = |k: usize| step(k, j) / span(k);
             let around = (i - reach..i).chain(i + 1..=i + reach);
-            let speeds: Vec<f64> = around.map(|k| step(k, j) / span(k)).collect();
+            let speeds: Vec<f64> = around.map(speed).collect();
+            let neighbours = (i - reach..i - 1).chain(i + 1..i + reach);
+            let noise = median(
+                neighbours
+                    .map(|k| (speed(k + 1) - speed(k)).abs())
+                    .collect(),
+            );
             let spread = median(speeds.iter().map(|v| v.abs()).collect());
             let largest = speeds.iter().map(|v| v.abs()).fold(0.0, f64::max);
             let usual = mean_of_middle(speeds) * span(i);
-            let fine = 5.0 * quanta[row];
+            // A smaller speed is not told from the noise of the encoder.
+            let fine = (5.0 * quanta[row]).max(SPEED_TO_NOISE * noise * span(i));
             if step(i, j).abs() > (8.0 * largest * span(i)).max(3.0 * fastest[row]) {
                 leaps += 1;
             }

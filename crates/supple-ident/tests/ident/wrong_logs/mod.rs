@@ -7,6 +7,7 @@ use supple_core::dynamics::regressor;
 use supple_core::{Arm, Vector};
 use supple_ident::log_checks::{Finding, Problem, check_log};
 use supple_ident::{DMatrix, Log, Motion, Preparation, estimate_delay, resample};
+use supple_random::Random;
 use variants::{Sizes, Variant, all};
 
 /// Torques that a point mass at the tip adds to a log.
@@ -122,6 +123,39 @@ fn a_flipped_sign_and_currents_are_named_and_a_sound_log_is_not() {
         unit.iter().any(|f| f.problem == Problem::NotJointTorques),
         "{unit:?}"
     );
+}
+
+/// A joint that turns slowly is, from sample to sample, moved less by its motion than by the noise of its encoder.
+#[test]
+fn noise_in_slow_motion_is_no_lost_sample_and_lost_samples_are_found_in_noise() {
+    let arm = tx40::description().arm::<6>().expect("six joints");
+    let rate_hz = 1000.0;
+    let log = |amplitude_rad: f64, kept: &dyn Fn(usize) -> bool| {
+        let mut noise = Random::new(7);
+        let mut normal = move || (0..12).map(|_| 0.5 * noise.signed()).sum::<f64>();
+        let samples: Vec<usize> = (0..20_000).filter(|i| kept(*i)).collect();
+        let angle_rad = |i: usize, joint: usize| {
+            let phase = core::f64::consts::TAU * i as f64 / rate_hz / 8.0 + 0.3 * joint as f64;
+            amplitude_rad * phase.sin()
+        };
+        Log {
+            t_s: (0..samples.len()).map(|i| i as f64 / rate_hz).collect(),
+            q_rad: DMatrix::from_fn(samples.len(), 6, |i, j| {
+                angle_rad(samples[i], j) + 2e-5 * normal()
+            }),
+            tau_nm: DMatrix::from_fn(samples.len(), 6, |_, _| 0.1 * normal()),
+            qd_rad_per_s: None,
+        }
+    };
+    let lost = |log: &Log| {
+        let found = findings(&arm, log, &[], &Preparation::default());
+        found.iter().any(|f| f.problem == Problem::LostSamples)
+    };
+    for amplitude_rad in [0.01, 0.03, 0.1, 0.3, 1.0] {
+        assert!(!lost(&log(amplitude_rad, &|_| true)), "{amplitude_rad} rad");
+    }
+    // One of a hundred samples while the joints turn fast enough to tell.
+    assert!(lost(&log(1.0, &|i| i % 100 != 17)));
 }
 
 #[test]
