@@ -40,6 +40,7 @@ fn seeded_bus<const N: usize>(emulator: Emulator<N>, seed: u64) -> TestBus<N> {
 pub fn startup_config<const N: usize>() -> StartupConfig<N> {
     StartupConfig {
         zero_at_rad: Some(description(N).home::<N>().unwrap()),
+        ask: None,
         limits: SafetyLimits {
             speed_fault: SpeedLimit::from_m_per_s(2.0).ok(),
             ..SafetyLimits::default()
@@ -83,6 +84,7 @@ impl<const N: usize> Rig<N> {
         let mut bus = seeded_bus(emulator, seed);
         let startup_config = StartupConfig {
             zero_at_rad: Some(pose),
+            ask: None,
             ..startup_config()
         };
         let ready = try_start(&mut bus, &startup_config).unwrap();

@@ -130,6 +130,7 @@ fn a_second_start_accepts_an_arm_that_is_awake_and_zeroed() {
     let mut bus = rig::bus(emulator);
     let startup_config = StartupConfig {
         zero_at_rad: None,
+        ask: None,
         ..startup_config::<4>()
     };
     let begun_ns = bus.now_ns();
@@ -143,6 +144,7 @@ fn a_second_start_accepts_an_arm_that_is_awake_and_zeroed() {
 fn an_arm_without_positions_is_rejected() {
     let startup_config = StartupConfig {
         zero_at_rad: None,
+        ask: None,
         ..startup_config::<4>()
     };
     let error = try_start(&mut idle_arm::<4>(EmulatorConfig::wam(4)), &startup_config);

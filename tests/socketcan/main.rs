@@ -46,6 +46,7 @@ fn in_service(interface: &str) -> Service {
     let mut bus = FaultInjector::new(SocketCan::open(interface).unwrap(), 1);
     let startup_config = StartupConfig {
         zero_at_rad: Some(description.home::<4>().unwrap()),
+        ask: None,
         limits: SafetyLimits::default(),
         tare: false,
     };

@@ -37,7 +37,7 @@ pub struct Options {
     /// The emulator owns the time, and each cycle waits for its answer.
     #[arg(long)]
     pub virtual_time: bool,
-    /// The arm is in its home pose now; if its positions are lost, they are set to the home pose. Not repeated after a loss of power.
+    /// The arm is in its home pose now; if its positions are lost, they are set to the home pose. Not repeated after a loss of power: `supple at-home` confirms it then.
     #[arg(long)]
     pub zero_at_home: bool,
     /// Speed of elbow and forearm at which the safety module ends torque (m/s).

@@ -154,8 +154,8 @@ pub enum Failure {
     },
     /// Nobody waits for `supple at-home`.
     #[error(
-        "no arm waits for this: it is needed after an emergency stop alone, once the power is back (release the button, press \
-         Shift-Idle)"
+        "no arm asks for its home pose: this is needed only after an emergency stop, once the power is back (release the button, \
+         press Shift-Idle); if the stop was pressed again, repeat that and confirm again"
     )]
     NoArmWaits,
     /// The home pose was not confirmed.

@@ -197,26 +197,33 @@ impl<const N: usize> Emulator<N> {
         self.injector.begun()
     }
 
-    /// Puts the arm back into the cradle in its start pose, as a person does; false, and nothing moves, while a motor
-    /// follows torque commands or a fault of the plant is injected.
-    pub fn put_into_cradle(&mut self) -> bool {
-        let torque = self
+    /// Puts the arm back into the cradle in its start pose, as a person does.
+    ///
+    /// # Errors
+    /// The reason in words, and nothing moves: a motor follows torque commands, or faults of the plant are injected.
+    pub fn put_into_cradle(&mut self) -> Result<(), &'static str> {
+        if self
             .pucks
             .iter()
-            .any(|puck| puck.mode() == MotorMode::Torque);
-        let placed = !torque
-            && self.injector.begun() == 0
-            && self
-                .plant
-                .set_state(self.start_rad, Vector::zeros())
-                .is_ok();
-        if placed {
-            self.injector = Injector::none(&self.plant);
-            self.update_motor_angles();
-            self.in_cradle = true;
-            self.record(ArmEvent::PutIntoCradle);
+            .any(|puck| puck.mode() == MotorMode::Torque)
+        {
+            return Err("the motors hold the arm: press idle first");
         }
-        placed
+        if !self.injector.is_empty() {
+            return Err("faults are injected, which count from the pose at the start: start again");
+        }
+        if self
+            .plant
+            .set_state(self.start_rad, Vector::zeros())
+            .is_err()
+        {
+            return Err("something is in the way of the cradle");
+        }
+        self.injector = Injector::none(&self.plant);
+        self.update_motor_angles();
+        self.in_cradle = true;
+        self.record(ArmEvent::PutIntoCradle);
+        Ok(())
     }
 
     /// Presses a button of the pendant.

@@ -121,11 +121,12 @@ pub fn answer<const N: usize>(emulator: &mut Emulator<N>, line: &str) -> String 
     }
     match line {
         "status" => json(&status(emulator)),
-        "cradle" if emulator.put_into_cradle() => json(&status(emulator)),
-        "cradle" => json(&ErrorReply {
-            error: "the arm moves by its motors, or a fault is injected: press idle first"
-                .to_owned(),
-        }),
+        "cradle" => match emulator.put_into_cradle() {
+            Ok(()) => json(&status(emulator)),
+            Err(reason) => json(&ErrorReply {
+                error: reason.to_owned(),
+            }),
+        },
         "record" => {
             let arm_events = emulator.events_in_monotonic_time();
             let entries = arm_events.map(|(time_ns, arm_event)| Entry {

@@ -96,7 +96,7 @@ fn effect(name: &'static str, set: impl FnOnce(&mut PlantOptions)) -> Effect {
 }
 
 /// The rows of the table: none, each effect alone, all at modest size.
-pub fn effects() -> Vec<Effect> {
+pub fn effects(arm: &Description) -> Vec<Effect> {
     vec![
         effect("none", |_| {}),
         effect("cables of 3000 N m/rad", |o| {
@@ -163,7 +163,7 @@ pub fn effects() -> Vec<Effect> {
         }),
         Effect {
             name: "realistic: all, of modest size",
-            options: PlantOptions::realistic(),
+            options: PlantOptions::realistic_of(arm),
         },
     ]
 }

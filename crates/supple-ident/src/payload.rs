@@ -148,6 +148,7 @@ fn added<const N: usize>(empty: &Fit<N>, motion: &Motion) -> Result<Vec<JointRow
     for joint in &mut joints {
         joint.b -= &joint.a * &empty.x;
         joint.a = DMatrix::zeros(motion.samples(), 10);
+        joint.motor_load = None;
     }
     for i in 0..motion.samples() {
         let at = |m: &DMatrix<f64>| Vector::<N>::from_fn(|j, _| m[(i, j)]);

@@ -5,6 +5,7 @@
 //! over a network.
 
 use crate::error::IpcError;
+use crate::home_files::HomeFiles;
 use iceoryx2::prelude::*;
 use std::path::{Path as StdPath, PathBuf};
 use supple_realtime::{PrivateFolderError, open_private_folder, runtime_folder};
@@ -98,10 +99,9 @@ impl Domain {
         self.folder.join(format!("learned-{}", self.prefix))
     }
 
-    /// File with which the operator confirms that the arm is in its home pose, after it has lost its positions; the
-    /// process that drives the arm removes it.
-    pub fn home_confirmation(&self) -> PathBuf {
-        self.folder.join(format!("at-home-{}", self.prefix))
+    /// Files of the question whether the arm is in its home pose, after it has lost its positions.
+    pub fn home_files(&self) -> HomeFiles {
+        HomeFiles::of(&self.folder, &self.prefix)
     }
 
     pub(crate) fn config(&self) -> &Config {

@@ -40,6 +40,7 @@ mod cleanup;
 mod client_slot;
 mod domain;
 mod error;
+mod home_files;
 mod idle;
 mod join;
 mod link;
@@ -53,6 +54,7 @@ mod writer_identity;
 
 pub use domain::{DEFAULT_PREFIX, Domain, PREFIX_VARIABLE};
 pub use error::IpcError;
+pub use home_files::HomeFiles;
 pub use idle::{
     IdleAnswer, IdleServer, idle_reply, idle_socket, idle_socket_is_open, request_idle,
 };

@@ -33,7 +33,7 @@ struct Row<'a> {
 /// [`Failure`].
 pub fn run(args: &EffectsArgs) -> Result<(), Failure> {
     let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
-    let mut chosen = effects();
+    let mut chosen = effects(&arm);
     if !args.only.is_empty() {
         chosen.retain(|effect| args.only.iter().any(|text| effect.name.contains(&**text)));
     }
@@ -152,6 +152,7 @@ fn median_and_worst_mm(errors_m: &[f64]) -> String {
 mod tests {
     use super::*;
     use supple_experiment::effects::FreeMotion;
+    use supple_model::Description;
 
     #[test]
     fn a_row_has_the_median_the_worst_the_latches_and_what_failed() {
@@ -175,7 +176,8 @@ mod tests {
             run(1, ModelSource::Calibrated, 0.0),
             run(0, ModelSource::Learning, 1e-3),
         ];
-        let effects = &effects()[..1];
+        let arm = Description::asset("wam4").expect("a built-in arm");
+        let effects = &effects(&arm)[..1];
         let page = page("wam4", 3, effects, &runs);
         assert!(
             page.contains("| none | 2.0 (3.0) | 4.0 | 1.0 | 4.0 (6.0) | 8.0 | 2.0 | 6 | 2 | 2 |"),

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from supple import _check, _native
-from supple._check import flag, integer, number, text
+from supple._check import flag, integer, number
 from supple._fit import Fit
 from supple._log_input import log_inputs
 
@@ -47,8 +47,9 @@ class FrictionColumns:
     def __post_init__(self) -> None:
         for name in ("viscous", "coulomb", "offset", "asymmetry"):
             flag(name, getattr(self, name))
-        if self.load is not None and text("load", self.load) not in ("joint", "motor"):
-            raise ValueError(f"load: expected \"joint\", \"motor\" or None, got {self.load!r}")
+        if self.load not in (None, "joint", "motor"):
+            wrong = ValueError if isinstance(self.load, str) else TypeError
+            raise wrong(f'load: expected "joint" (before: True), "motor" or None, got {self.load!r}')
         if self.stribeck_rad_per_s is not None:
             number("stribeck_rad_per_s", self.stribeck_rad_per_s, signed=True)
         number("band_rad_per_s", self.band_rad_per_s, signed=True)

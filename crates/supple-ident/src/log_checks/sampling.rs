@@ -15,6 +15,8 @@ const REFRESHES_PER_PERIOD: f64 = 6.0;
 const MIN_LOST_RATIO: f64 = 1.6;
 /// Minimum ratio of the speed of a joint to what its speed changes from step to step, at which lost samples are looked for.
 const SPEED_TO_NOISE: f64 = 5.0;
+/// Of independent errors of the angles: the deviation of a change of the speed over that of its second difference.
+const BEND_TO_CHANGE: f64 = 0.548;
 
 pub(super) fn check(log: &Log, moving: &[usize], cutoff_hz: f64) -> Vec<Finding> {
     let steps: Vec<f64> = log.t_s.windows(2).map(|w| w[1] - w[0]).collect();
@@ -313,12 +315,10 @@ fn lost_samples(log: &Log, moving: &[usize], step_s: f64) -> Option<Finding> {
             let speed = |k: usize| step(k, j) / span(k);
             let around = (i - reach..i).chain(i + 1..=i + reach);
             let speeds: Vec<f64> = around.map(speed).collect();
-            let neighbours = (i - reach..i - 1).chain(i + 1..i + reach);
-            let noise = median(
-                neighbours
-                    .map(|k| (speed(k + 1) - speed(k)).abs())
-                    .collect(),
-            );
+            // Second differences, since a motion accelerates.
+            let neighbours = (i - reach + 1..i - 1).chain(i + 2..i + reach);
+            let bend = |k: usize| (speed(k + 1) - 2.0 * speed(k) + speed(k - 1)).abs();
+            let noise = BEND_TO_CHANGE * median(neighbours.map(bend).collect());
             let spread = median(speeds.iter().map(|v| v.abs()).collect());
             let largest = speeds.iter().map(|v| v.abs()).fold(0.0, f64::max);
             let usual = mean_of_middle(speeds) * span(i);

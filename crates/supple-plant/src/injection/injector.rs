@@ -195,6 +195,11 @@ impl<const N: usize> Injector<N> {
         running.any(|running| running.injection.kind == InjectionKind::MotorDead { motor })
     }
 
+    /// Whether there are no injections, neither begun nor scheduled.
+    pub fn is_empty(&self) -> bool {
+        self.running.is_empty()
+    }
+
     /// Number of injections that have begun.
     pub fn begun(&self) -> usize {
         self.running.iter().filter(|running| running.begun).count()

@@ -288,7 +288,7 @@ fn presses(spec: &Spec, times: &Times) -> Vec<String> {
         ) => {
             vec![at("idle", 0.0), at("activate", back_s)]
         }
-        // The arm loses its positions with its power: there is no way back without a new start.
+        // The arm loses its positions with its power, and then asks for its home pose.
         Event::Drives(DriveShutdown::EStop) => vec![
             at("e-stop", 0.0),
             at("release", RELEASE_S),
@@ -319,14 +319,9 @@ fn run<const N: usize>(
         if telemetry.is_none() {
             match system.clock_has_ended() {
                 Ok(true) => break,
-                Ok(false) => {}
                 // The arm's pose is not taken for its home pose again.
-                Err(Failure::ProcessEnded { .. })
-                    if spec.event == Event::Drives(DriveShutdown::EStop) =>
-                {
-                    let _ = system.end();
-                    return Ok((samples, refusals));
-                }
+                Ok(false) if domain.home_files().question().is_some() => break,
+                Ok(false) => {}
                 Err(failure) => return Err(failure),
             }
         }

@@ -1,44 +1,62 @@
 //! `supple at-home`: the operator confirms that an arm which has lost its positions is in its home pose.
 
+use super::ask::running;
 use crate::cli::AtHomeArgs;
 use core::time::Duration;
 use std::time::Instant;
 use supple_cli::console::{confirms, print_json, print_line};
 use supple_cli::exit::Failure;
-use supple_ipc::Domain;
 use supple_realtime::pause;
 
-/// Time within which a process that waits for the confirmation takes it.
+/// Time for the motors to wake after the power is back: the arm asks only then.
+const ASKED_WITHIN: Duration = Duration::from_secs(15);
+/// Time within which an arm that waits takes the answer.
 const TAKEN_WITHIN: Duration = Duration::from_secs(3);
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Runs `supple at-home`.
 ///
 /// # Errors
-/// [`Failure::NoArmWaits`] if nobody waits for the confirmation; [`Failure::NotConfirmed`] without `--yes` where nobody
-/// can be asked, or if the operator declines.
+/// [`Failure::NotRunning`] without a system; [`Failure::NoArmWaits`] if no arm asks for its home pose, or no longer;
+/// [`Failure::NotConfirmed`] if the operator declines, or without `--yes` where nobody can be asked.
 pub fn at_home(args: &AtHomeArgs) -> Result<(), Failure> {
-    let question = "is the arm supported in its home pose? Its positions are set to that pose; if it is elsewhere, the arm \
-                    falls or strikes.";
-    if !(args.yes || confirms(question)) {
+    let (domain, ..) = running(&args.system)?;
+    let files = domain.home_files();
+    let mut pose = None;
+    until(ASKED_WITHIN, || {
+        pose = files.question();
+        pose.is_some()
+    });
+    let pose = pose.ok_or(Failure::NoArmWaits)?;
+    let question = format!(
+        "is the arm supported in its home pose, {pose}? Its positions are set to that pose; an arm that is elsewhere falls or \
+         strikes."
+    );
+    if !(args.yes || confirms(&question)) {
         return Err(Failure::NotConfirmed);
     }
-    let domain = Domain::new(args.system.prefix.as_deref()).map_err(Failure::system)?;
-    let file = domain.home_confirmation();
-    std::fs::write(&file, "").map_err(|error| Failure::file("write", &file, error))?;
-    let start = Instant::now();
-    while file.exists() {
-        if start.elapsed() > TAKEN_WITHIN {
-            // If it was taken at this moment, the arm starts all the same.
-            return match std::fs::remove_file(&file) {
-                Ok(()) => Err(Failure::NoArmWaits),
-                Err(_) => break,
-            };
-        }
-        pause(POLL_INTERVAL);
+    // The question is withdrawn if the power is lost once more.
+    files.answer().map_err(|_| Failure::NoArmWaits)?;
+    if !until(TAKEN_WITHIN, || !files.answer_waits()) {
+        files.withdraw();
+        return Err(Failure::NoArmWaits);
     }
     match args.system.json {
         true => print_json(&serde_json::json!({ "confirmed": true })),
-        false => print_line("the arm starts with its positions set to the home pose"),
+        false => print_line("confirmed: the positions are set to the home pose"),
+    }
+}
+
+/// Polls the condition; false if it does not hold within this time.
+fn until(within: Duration, mut holds: impl FnMut() -> bool) -> bool {
+    let start = Instant::now();
+    loop {
+        if holds() {
+            return true;
+        }
+        if start.elapsed() > within {
+            return false;
+        }
+        pause(POLL_INTERVAL);
     }
 }

@@ -268,8 +268,9 @@ impl UpArgs {
             PlantKind::Can => "can",
         };
         let joints = description.dof();
+        let is_wam = WAM_JOINTS.contains(&joints) && description.describes_motors();
         match description.bus() {
-            None if !WAM_JOINTS.contains(&joints) => Err(Failure::NoDrivesForArm {
+            None if !is_wam => Err(Failure::NoDrivesForArm {
                 plant,
                 arm: description.name().to_owned(),
                 joints,

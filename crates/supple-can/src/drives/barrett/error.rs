@@ -200,6 +200,9 @@ pub enum CanError {
         /// Home pose as text.
         home: String,
     },
+    /// The operator cannot be asked for the home pose.
+    #[error("the question for the home pose cannot be written into the folder of the system: {0}")]
+    Question(#[source] std::io::Error),
     /// The module is in another mode than requested.
     #[error(
         "the safety module is in {found:?}, expected {expected:?}: press Shift-Idle at the pendant and start again"

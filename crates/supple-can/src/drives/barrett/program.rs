@@ -6,8 +6,6 @@ use super::error::CanError;
 use super::start_up::{Progress, StartupConfig, start_up};
 use crate::cycles::{Ended, SEARCH_INTERVAL, open, run_until_shutdown, sum_counters};
 use crate::options::{Options, print_budget};
-use std::path::Path;
-use std::time::SystemTime;
 use supple_bus::{Address, BusError};
 use supple_drive::{Counters, CycleConfig, SharedMemoryLink};
 use supple_ipc::{Domain, PlantLink};
@@ -47,6 +45,7 @@ fn run_joints<const N: usize>(
     }
     let mut startup_config = StartupConfig {
         zero_at_rad: options.zero_at_home.then_some(home_rad),
+        ask: None,
         limits: SafetyLimits {
             speed_fault: SpeedLimit::from_m_per_s(options.speed_limit_m_per_s).ok(),
             ..SafetyLimits::default()
@@ -82,20 +81,13 @@ fn run_joints<const N: usize>(
             // After a power loss keep trying; the other processes continue meanwhile.
             Err(
                 CanError::Missing { .. }
+                // Once more the emergency stop.
+                | CanError::Mode { .. }
                 | CanError::BusFault(_)
                 // Unacknowledged frames fill the transmit queue.
                 | CanError::Bus(BusError::Full),
             ) if !first && !stop.shutdown_requested() => {
                 pause(SEARCH_INTERVAL);
-                continue;
-            }
-            Err(CanError::NotZeroed { home, .. }) if !first && !stop.shutdown_requested() => {
-                diagnostics::post(format_args!(
-                    "supple-can: the arm has lost its positions: put it into its home pose {home} rad, then confirm it with \
-                     `supple at-home`"
-                ));
-                let confirmed = wait_for_confirmation(&domain.home_confirmation(), &stop_requested);
-                startup_config.zero_at_rad = confirmed.then_some(home_rad);
                 continue;
             }
             Err(error) => return Err(error),
@@ -108,7 +100,12 @@ fn run_joints<const N: usize>(
         }
         first = false;
         // An arm falls while it has no power: it is in its home pose, and its sensor unloaded, at the first start-up alone.
-        (startup_config.zero_at_rad, startup_config.tare) = (None, false);
+        startup_config = StartupConfig {
+            zero_at_rad: None,
+            ask: Some(domain.home_files()),
+            tare: false,
+            ..startup_config
+        };
         let mut plant = cycle(bus, link, ready, &config, cycle_config)?;
         let names = config.joint_names;
         let ended = run_until_shutdown(&mut plant, options.cycles, stop, names.as_slice())?;
@@ -122,20 +119,6 @@ fn run_joints<const N: usize>(
             "supple-can: the arm does not reply any more: searching for it"
         ));
     }
-}
-
-/// Waits until the operator confirms that the arm is in its home pose; false if a shutdown is requested first. An older
-/// confirmation does not count.
-fn wait_for_confirmation(file: &Path, stop_requested: &dyn Fn() -> bool) -> bool {
-    let since = SystemTime::now();
-    while !stop_requested() {
-        let written = std::fs::metadata(file).and_then(|found| found.modified());
-        if written.is_ok_and(|written| written >= since) && std::fs::remove_file(file).is_ok() {
-            return true;
-        }
-        pause(SEARCH_INTERVAL);
-    }
-    false
 }
 
 fn report_progress(progress: Progress) {
@@ -153,6 +136,9 @@ fn report_progress(progress: Progress) {
         }
         Progress::Checking => diagnostics::post(format_args!(
             "supple-can: comparing the pucks with the description"
+        )),
+        Progress::WaitingForHome => diagnostics::post(format_args!(
+            "supple-can: the arm has lost its positions: put it into its home pose, then confirm it with `supple at-home`"
         )),
         Progress::Zeroing => diagnostics::post(format_args!(
             "supple-can: setting the positions to the home pose"

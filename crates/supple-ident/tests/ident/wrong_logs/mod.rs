@@ -129,11 +129,10 @@ fn a_flipped_sign_and_currents_are_named_and_a_sound_log_is_not() {
 #[test]
 fn noise_in_slow_motion_is_no_lost_sample_and_lost_samples_are_found_in_noise() {
     let arm = tx40::description().arm::<6>().expect("six joints");
-    let rate_hz = 1000.0;
-    let log = |amplitude_rad: f64, kept: &dyn Fn(usize) -> bool| {
+    let log = |rate_hz: f64, amplitude_rad: f64, kept: &dyn Fn(usize) -> bool| {
         let mut noise = Random::new(7);
         let mut normal = move || (0..12).map(|_| 0.5 * noise.signed()).sum::<f64>();
-        let samples: Vec<usize> = (0..20_000).filter(|i| kept(*i)).collect();
+        let samples: Vec<usize> = (0..10_000).filter(|i| kept(*i)).collect();
         let angle_rad = |i: usize, joint: usize| {
             let phase = core::f64::consts::TAU * i as f64 / rate_hz / 8.0 + 0.3 * joint as f64;
             amplitude_rad * phase.sin()
@@ -152,10 +151,20 @@ fn noise_in_slow_motion_is_no_lost_sample_and_lost_samples_are_found_in_noise() 
         found.iter().any(|f| f.problem == Problem::LostSamples)
     };
     for amplitude_rad in [0.01, 0.03, 0.1, 0.3, 1.0] {
-        assert!(!lost(&log(amplitude_rad, &|_| true)), "{amplitude_rad} rad");
+        for rate_hz in [100.0, 1000.0] {
+            assert!(
+                !lost(&log(rate_hz, amplitude_rad, &|_| true)),
+                "{amplitude_rad} rad at {rate_hz} Hz"
+            );
+        }
     }
     // One of a hundred samples while the joints turn fast enough to tell.
-    assert!(lost(&log(1.0, &|i| i % 100 != 17)));
+    for (rate_hz, amplitude_rad) in [(1000.0, 1.0), (100.0, 0.1), (50.0, 0.1)] {
+        assert!(
+            lost(&log(rate_hz, amplitude_rad, &|i| i % 100 != 17)),
+            "{amplitude_rad} rad at {rate_hz} Hz"
+        );
+    }
 }
 
 #[test]

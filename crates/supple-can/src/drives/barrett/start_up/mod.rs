@@ -22,6 +22,7 @@ use crate::drives::barrett::transmission::Transmission;
 pub use motors::{ARM_GROUPS, MotorPuck};
 use supple_bus::Bus;
 use supple_core::Vector;
+use supple_ipc::HomeFiles;
 use supple_model::Description;
 use supple_puck::safety::{SafetyLimits, SafetyMode};
 use supple_puck::status::Stat;
@@ -42,6 +43,8 @@ const IGNORED_FAULTS: i32 = 8;
 pub struct StartupConfig<const N: usize> {
     /// Current pose of the arm \[rad\]; `None` if unknown.
     pub zero_at_rad: Option<Vector<N>>,
+    /// Where the operator is asked to confirm the home pose if it is unknown; `None` makes that an error.
+    pub ask: Option<HomeFiles>,
     /// Limits of the safety module.
     pub limits: SafetyLimits,
     /// Tare the force/torque sensor, if there is one. If false, the sensor keeps its last tare.
@@ -59,6 +62,8 @@ pub enum Progress {
     Waking(usize),
     /// Comparing pucks with the description.
     Checking,
+    /// Waiting for the operator to confirm the home pose.
+    WaitingForHome,
     /// Setting the positions to the home pose.
     Zeroing,
     /// Taring the sensor.
@@ -226,6 +231,39 @@ fn wake<B: Bus>(
     Ok(())
 }
 
+/// Waits until the operator confirms that the arm is in its home pose. The module stays in idle meanwhile: if the power is lost once
+/// more, the arm sinks, and an answer is worth nothing.
+fn wait_for_home<const N: usize, B: Bus>(
+    host: &mut Host<'_, B>,
+    module: &PropertyTable,
+    description: &Description,
+    files: &HomeFiles,
+) -> Result<Vector<N>, CanError> {
+    let joints = description.joint_names().iter().zip(description.home_rad());
+    let pose: Vec<String> = joints
+        .map(|(name, angle_rad)| format!("{name} {angle_rad} rad"))
+        .collect();
+    files.ask(&pose.join(", ")).map_err(CanError::Question)?;
+    loop {
+        host.wait_silently(OPERATOR_POLL_NS)?;
+        let answered = files.take_answer();
+        let mode = module::mode(host, module)?;
+        if mode != SafetyMode::Idle {
+            return Err(CanError::Mode {
+                found: mode,
+                expected: SafetyMode::Idle,
+            });
+        }
+        if answered {
+            let home = description.home::<N>();
+            return home.map_err(|_| CanError::Joints {
+                arm: description.name().to_owned(),
+                found: description.dof(),
+            });
+        }
+    }
+}
+
 /// Sets the motor positions from the home pose, unless the safety module reports that they are already set.
 fn set_home_positions<const N: usize, B: Bus>(
     host: &mut Host<'_, B>,
@@ -241,11 +279,20 @@ fn set_home_positions<const N: usize, B: Bus>(
     if found == 1 {
         return Ok(());
     }
-    let Some(home) = startup_config.zero_at_rad else {
-        return Err(CanError::NotZeroed {
-            zero: found,
-            home: format!("{:?}", description.home_rad()),
-        });
+    let home = match (startup_config.zero_at_rad, &startup_config.ask) {
+        (Some(home), _) => home,
+        (None, Some(files)) => {
+            progress(Progress::WaitingForHome);
+            let confirmed = wait_for_home(host, module, description, files);
+            files.withdraw();
+            confirmed?
+        }
+        (None, None) => {
+            return Err(CanError::NotZeroed {
+                zero: found,
+                home: format!("{:?}", description.home_rad()),
+            });
+        }
     };
     progress(Progress::Zeroing);
     let counts = transmission.counts(&home)?;
