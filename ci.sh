@@ -4,7 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 PLAIN=(fmt clippy test doctest doc)
-FULL=(deny advisories page python package impact ur10e instructions fused edits cycles fuzz cortex-m socketcan services)
+FULL=(deny advisories page python package impact ur10e urdfs instructions fused edits cycles fuzz cortex-m socketcan services)
 CARGO_DENY_VERSION=0.20.2
 CARGO_FUZZ_VERSION=0.13.2
 GUNGRAUN_VERSION=0.20.0
@@ -154,19 +154,19 @@ virtual_environment() {
         skip "the packages of $2 cannot be installed"
 }
 
-# urdfs: ten public URDFs, unedited, through `supple new` and `up --plant sim`; in no list; installs packages that carry them
+# urdfs: ten public URDFs, unedited, through `supple new`, the demo and `up --plant sim`; installs packages that carry them
 step_urdfs() {
     virtual_environment urdfs tests/any_arm/requirements.txt
     # The programs that `test` builds.
     cargo build --locked --workspace --exclude supple-python --bins
-    "$WORK/urdfs/bin/python" tests/any_arm/run.py --programs target/debug --quick
+    "$WORK/urdfs/bin/python" tests/any_arm/run.py --programs target/debug --steps new,demo,up
 }
 
-# urdfs_full: the same URDFs also through the demo, with optimised programs; in no list
+# urdfs_full: these and six more, identified too, with optimised programs; in no list
 step_urdfs_full() {
-    virtual_environment urdfs tests/any_arm/requirements.txt
+    virtual_environment urdfs tests/any_arm/requirements-held-back.txt
     cargo build --release --locked --workspace --exclude supple-python --bins
-    "$WORK/urdfs/bin/python" tests/any_arm/run.py --programs target/release
+    "$WORK/urdfs/bin/python" tests/any_arm/run.py --programs target/release --all
 }
 
 # instructions: instruction counts of the core against committed limits, and no bounds checks; installs Valgrind and gungraun-runner

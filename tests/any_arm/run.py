@@ -6,14 +6,14 @@ A case passes if
 - `supple new` writes the arm, and its run of 5 s on the sinusoid errs no more than `allowed_error_m` (15 mm, more in
   proportion for an arm that weighs more than 23 N at the tip), without a fault;
 - the demo ends with code 0, none of its sinusoids at 5 N/m with a model that is 0.1 % and 3 % off was made smaller or left
-  out, and the worst of them errs no more than that either (not with `--quick`);
+  out, and the worst of them errs no more than that either;
 - `up` tracks for 60 s without a fault;
 - `excite design`, `excite run` and `identify` give a model that leaves at most 10 % of the torques of a motion that was not
-  fitted (not with `--quick`).
+  fitted.
 
 Run it with the interpreter of a virtual environment that has requirements.txt, with `--all` requirements-held-back.txt:
 
-    python tests/any_arm/run.py --programs target/release [--all] [--quick] [--only NAME] [--jobs N] [--out FOLDER]
+    python tests/any_arm/run.py --programs target/release [--all] [--steps NAME,NAME] [--only NAME] [--jobs N] [--out FOLDER]
                                 [--table FILE]
 """
 
@@ -126,6 +126,9 @@ def identify(programs: Path, case: Case, out: Path, _number: int) -> str:
     return f"{100 * left:.1f} % left"
 
 
+STEPS: dict[str, Step] = {"new": new, "demo": demo, "up": up, "identify": identify}
+
+
 def attempt(steps: dict[str, Step], programs: Path, case: Case | Missing, results: Path, number: int) -> Outcome:
     """Tries a case."""
     if isinstance(case, Missing):
@@ -146,15 +149,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--programs", type=Path, default=REPOSITORY / "target" / "release")
     parser.add_argument("--all", action="store_true", help="also the cases that are held back")
-    parser.add_argument("--quick", action="store_true", help="leave out demo and identification")
+    parser.add_argument("--steps", default=",".join(STEPS), help="which of new, demo, up, identify; default: all")
     parser.add_argument("--jobs", type=int, default=2, help="cases at a time")
     parser.add_argument("--only", default="", help="cases whose path contains this")
     parser.add_argument("--out", type=Path, help="keep the results here")
     parser.add_argument("--table", type=Path, help="write the results as Markdown")
     options = parser.parse_args()
-    steps: dict[str, Step] = {"new": new, "up": up}
-    if not options.quick:
-        steps = {"new": new, "demo": demo, "up": up, "identify": identify}
+    steps = {name: STEPS[name] for name in options.steps.split(",")}
     outcomes: list[Outcome] = []
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(options.jobs) as pool:
         results = options.out or Path(folder)
