@@ -53,6 +53,7 @@ fn in_service() -> Service {
     let mut bus = FaultInjector::new(Uncounted(DirectBus(arm)), 1);
     let startup_config = StartupConfig {
         zero_at_rad: Some(home_rad),
+        ask: None,
         limits: SafetyLimits::default(),
         tare: false,
     };
