@@ -54,11 +54,6 @@ impl HomeFiles {
     pub fn answer(&self) -> io::Result<()> {
         std::fs::rename(&self.question, &self.answer)
     }
-
-    /// Whether an answer has not been taken yet.
-    pub fn answer_waits(&self) -> bool {
-        self.answer.exists()
-    }
 }
 
 fn remove(file: &Path) -> io::Result<()> {

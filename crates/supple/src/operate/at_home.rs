@@ -6,12 +6,13 @@ use core::time::Duration;
 use std::time::Instant;
 use supple_cli::console::{confirms, print_json, print_line};
 use supple_cli::exit::Failure;
+use supple_ipc::message::Drives;
 use supple_realtime::pause;
 
 /// Time for the motors to wake after the power is back: the arm asks only then.
 const ASKED_WITHIN: Duration = Duration::from_secs(15);
-/// Time within which an arm that waits takes the answer.
-const TAKEN_WITHIN: Duration = Duration::from_secs(3);
+/// Time within which an arm that waits has its positions, and replies again.
+const BACK_WITHIN: Duration = Duration::from_secs(5);
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Runs `supple at-home`.
@@ -20,7 +21,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// [`Failure::NotRunning`] without a system; [`Failure::NoArmWaits`] if no arm asks for its home pose, or no longer;
 /// [`Failure::NotConfirmed`] if the operator declines, or without `--yes` where nobody can be asked.
 pub fn at_home(args: &AtHomeArgs) -> Result<(), Failure> {
-    let (domain, ..) = running(&args.system)?;
+    let (domain, mut reader, _) = running(&args.system)?;
     let files = domain.home_files();
     let mut pose = None;
     until(ASKED_WITHIN, || {
@@ -37,7 +38,19 @@ pub fn at_home(args: &AtHomeArgs) -> Result<(), Failure> {
     }
     // The question is withdrawn if the power is lost once more.
     files.answer().map_err(|_| Failure::NoArmWaits)?;
-    if !until(TAKEN_WITHIN, || !files.answer_waits()) {
+    let mut back = false;
+    let mut failed = None;
+    until(BACK_WITHIN, || {
+        match reader.wait(POLL_INTERVAL) {
+            Ok(telemetry) => back = telemetry.is_some_and(|t| t.state.drives() != Drives::Off),
+            Err(error) => failed = Some(error),
+        }
+        back || failed.is_some()
+    });
+    if let Some(error) = failed {
+        return Err(Failure::system(error));
+    }
+    if !back {
         files.withdraw();
         return Err(Failure::NoArmWaits);
     }
