@@ -37,7 +37,7 @@ def test_the_motion_is_consistent(arm, excitation):
 def test_a_urdf_alone_is_excited_and_identified():
     """Its motors are not described: its encoders measure at the joints, where the noise of a WAM's motors is a fault."""
     urdf = Path(__file__).parents[2] / "assets/wam3/arm.urdf"
-    arm = supple.Arm.from_urdf(urdf, tip="tip")
+    arm = supple.Arm.from_urdf(urdf, tip="tip").completed()
     motion = supple.design_excitation(arm, candidates=60, period_s=8.0, periods=2)
     recording = supple.excite(arm, motion)
     fit = supple.identify(
@@ -45,7 +45,7 @@ def test_a_urdf_alone_is_excited_and_identified():
     )
     assert fit.training_relative < 0.05
     assert supple.plant_options("urdf-realistic")["encoder_noise_rad"] < 1e-4
-    with pytest.raises(ValueError, match="external torque|oscillates|turns at"):
+    with pytest.raises(ValueError, match="excitation: fault"):
         supple.excite(arm, motion, encoder_noise_rad=5e-3)
 
 

@@ -16,8 +16,9 @@ const ACCELERATION_SHARE: f64 = 0.95;
 /// Points at which the tip's speed is computed.
 const POINTS: u32 = 64;
 
-/// Duration of a minimum-jerk move on a straight line in joint space, at least one second, within the limits as
-/// [`within_limits_s`] \[s\]. It is rounded up to 0.01 s, so that equal moves give equal logs.
+/// Duration of a minimum-jerk move on a straight line in joint space: at least one second, at most half of the joint speed
+/// limits, 85 % of the tip's, and within the limits of acceleration and jerk \[s\]. It is rounded up to 0.01 s, so that equal moves
+/// give equal logs.
 pub fn approach_s<const N: usize>(
     config: &Config<N>,
     from_rad: &Vector<N>,
