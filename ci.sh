@@ -154,13 +154,12 @@ virtual_environment() {
         skip "the packages of $2 cannot be installed"
 }
 
-# urdfs: ten public URDFs, unedited, through `supple new` and `up --plant sim`, three of them through the demo; installs packages that carry them
+# urdfs: ten public URDFs, unedited, through `supple new`, the demo and `up --plant sim`; installs packages that carry them
 step_urdfs() {
     virtual_environment urdfs tests/any_arm/requirements.txt
     # The programs that `test` builds.
     cargo build --locked --workspace --exclude supple-python --bins
-    "$WORK/urdfs/bin/python" tests/any_arm/run.py --programs target/debug --steps new,up
-    "$WORK/urdfs/bin/python" tests/any_arm/run.py --programs target/debug --steps new,demo --only panda,kinova,so101
+    "$WORK/urdfs/bin/python" tests/any_arm/run.py --programs target/debug --steps new,demo,up
 }
 
 # urdfs_full: these and six more, identified too, with optimised programs; in no list
@@ -176,9 +175,7 @@ step_instructions() {
     needs_command valgrind valgrind
     [[ -e /usr/lib/debug/.build-id || -e /usr/share/doc/libc6-dbg ]] || needs_package libc6-dbg
     local root=target/tools
-    if [[ $("$root/bin/gungraun-runner" --version 2>/dev/null) != "gungraun-runner $GUNGRAUN_VERSION" ]]; then
-        install_tool gungraun-runner@$GUNGRAUN_VERSION
-    fi
+    gungraun_runner
     GUNGRAUN_RUNNER=$PWD/$root/bin/gungraun-runner RUSTFLAGS="" \
         cargo bench --locked -p supple-benches --bench instructions
     needs_command objdump binutils
@@ -305,6 +302,12 @@ cargo_deny() {
     "$root/bin/cargo-deny" "$@"
 }
 
+gungraun_runner() {
+    if [[ $(target/tools/bin/gungraun-runner --version 2>/dev/null) != "gungraun-runner $GUNGRAUN_VERSION" ]]; then
+        install_tool gungraun-runner@$GUNGRAUN_VERSION
+    fi
+}
+
 # Builds a tool under target/tools; unoptimised and without debug information, which takes half the time and serves as well.
 install_tool() {
     local root=target/tools
@@ -388,6 +391,7 @@ help() {
     cat <<END
 ./ci.sh          ${PLAIN[*]}: no root, nothing installed
 ./ci.sh full     ${FULL[*]}: what the plain run leaves out; as root, installs packages
+./ci.sh tools    builds the tools of the full run, whose steps otherwise do it
 ./ci.sh summary  how every step on record ended
 ./ci.sh STEP...  these steps:
 END
@@ -411,6 +415,11 @@ main() {
     full)
         run_all "${FULL[@]}"
         summary "${FULL[@]}"
+        ;;
+    tools)
+        # Built before the steps that need them, which otherwise build them themselves.
+        cargo_deny --version
+        gungraun_runner
         ;;
     summary) summary ;;
     help | -h | --help) help ;;
