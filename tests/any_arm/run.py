@@ -7,10 +7,10 @@ A case passes if
   proportion for an arm that weighs more than 23 N at the tip), without a fault;
 - the demo ends with code 0, none of its sinusoids at 5 N/m with a model that is 0.1 % and 3 % off was made smaller or left
   out, and the worst of them errs no more than that either;
-- `up` tracks for 60 s without a fault;
+- `up` tracks for 60 s without a fault.
 
-What `excite design`, `excite run` and `identify` give is reported, and judges no case: the excitation of some arms ends with a
-fault, since the derived collision thresholds of small joints are below their friction.
+What `excite design`, `excite run` and `identify` give is reported, and judges no case: derived thresholds end the excitation of
+some arms with a fault.
 
 Run it with the interpreter of a virtual environment that has requirements.txt, with `--all` requirements-held-back.txt:
 

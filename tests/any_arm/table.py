@@ -12,8 +12,8 @@ Written by `tests/any_arm/run.py --all --table`; do not edit. Each URDF is given
 the tip: `supple new` (5 s of the sinusoid at 5 N/m with a model that is 0.1 % and 3 % off), `supple demo` (the worst of ten
 such models; none of these runs was made smaller or left out), `supple up --plant sim` in virtual time, and `supple excite design`,
 `excite run` and `identify`: what the model leaves of the torques of a motion that was not fitted. Allowed are 15 mm RMS, more in
-proportion for an arm that weighs more than 23 N at the tip. Identification is reported, not judged: the derived collision
-thresholds of small joints with much friction end some excitations with a fault.
+proportion for an arm that weighs more than 23 N at the tip. Identification is reported, not judged: derived thresholds end
+some excitations with a fault.
 
 | URDF | tip | `supple new` | `supple demo` | `supple up` | `supple identify` | outcome |
 |---|---|---|---|---|---|---|

@@ -320,7 +320,12 @@ fn run<const N: usize>(
             match system.clock_has_ended() {
                 Ok(true) => break,
                 // The arm's pose is not taken for its home pose again.
-                Ok(false) if domain.home_files().question().is_some() => break,
+                Ok(false)
+                    if spec.event == Event::Drives(DriveShutdown::EStop)
+                        && domain.home_files().question().is_some() =>
+                {
+                    break;
+                }
                 Ok(false) => {}
                 Err(failure) => return Err(failure),
             }

@@ -58,6 +58,8 @@ fn run_joints<const N: usize>(
         .min(startup_config.limits.speed_fault);
     startup_config.limits.speed_warning = warning;
     let domain = Domain::new(options.prefix.as_deref())?;
+    // A process that was killed while it asked has left its question.
+    domain.home_files().withdraw();
     let link = PlantLink::new(&domain)?;
     let mut link = SharedMemoryLink::new(link, options.virtual_time, stop.clone());
     let address = match &options.bus {
