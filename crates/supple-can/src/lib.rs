@@ -18,7 +18,7 @@ mod cycles;
 mod options;
 mod program;
 
-pub use backend::{DriveBackend, RunError};
+pub use backend::DriveBackend;
 pub use drives::barrett::bus_time::{Budget, BusTime, Overload};
 pub use drives::barrett::start_up::{
     ARM_GROUPS, MotorPuck, Progress, Ready, StartupConfig, start_up,

@@ -4,39 +4,26 @@ use clap::Parser;
 use core::fmt::Display;
 use std::io::Write as _;
 use supple_bus::Address;
-use supple_model::{Description, ModelError, UrdfArgs};
+use supple_process::{ProcessOptions, RateOption};
 use supple_puck::safety::SpeedLimit;
-use supple_realtime::{RealtimeOptions, Settings};
 
 /// Operates an arm on its CAN bus: polls it, publishes its state, and sends the controller's torques.
 ///
 /// It never activates Barrett's pucks: the operator does, at the pendant. Damiao motors have no pendant: it enables them
-/// when a controller in gravity hold requests torque. It may end torque at any time.
+/// when a controller in gravity hold requests torque. It may end torque at any time. The arm is a WAM with 4 or 7 joints, or
+/// has `[bus]` in its TOML.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "supple-can", version)]
 pub struct Options {
-    /// A WAM with 4 or 7 joints, or an arm with `[bus]`: a built-in arm, or the path of its TOML, of its
-    /// folder, or of a URDF.
-    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
-    pub arm: String,
-    /// Treats URDF elements that are not supported as errors instead of warnings.
-    #[arg(long)]
-    pub strict: bool,
-    /// What a URDF alone does not contain.
+    /// What all periodic programs have.
     #[command(flatten)]
-    pub urdf: UrdfArgs,
-    /// Cycles per second; default: the rate of the arm. All processes of a system must use the same rate.
-    #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(10..=10_000))]
-    pub rate_hz: Option<u32>,
-    /// Prefix of the system; default: SUPPLE_PREFIX or `supple`.
-    #[arg(long, value_name = "NAME")]
-    pub prefix: Option<String>,
+    pub process: ProcessOptions,
+    /// The rate.
+    #[command(flatten)]
+    pub rate: RateOption,
     /// can:NAME or unix:FOLDER; default: the sockets of an emulator with the same prefix.
     #[arg(long, value_name = "BUS")]
     pub bus: Option<Address>,
-    /// The emulator owns the time, and each cycle waits for its answer.
-    #[arg(long)]
-    pub virtual_time: bool,
     /// The arm is in its home pose now; if its positions are lost, they are set to the home pose. Not repeated after a loss of power: `supple at-home` confirms it then.
     #[arg(long)]
     pub zero_at_home: bool,
@@ -63,28 +50,6 @@ pub struct Options {
     /// Priority under SCHED_FIFO.
     #[arg(long, value_name = "1-99", default_value_t = 79, value_parser = clap::value_parser!(u8).range(1..=99))]
     pub priority: u8,
-    #[command(flatten)]
-    realtime: RealtimeOptions,
-}
-
-impl Options {
-    /// The arm, at the requested rate.
-    ///
-    /// # Errors
-    /// As [`Description::find_at_rate`]; with `--strict`, also an unsupported URDF element.
-    pub fn description(&self) -> Result<Description, ModelError> {
-        Description::find_at_rate(&self.urdf.name(&self.arm), self.rate_hz)?.strict_if(self.strict)
-    }
-
-    /// Whether the process must end when its parent ends.
-    pub fn supervised(&self) -> bool {
-        self.realtime.supervised
-    }
-
-    /// Real-time settings of the process.
-    pub fn realtime(&self) -> Settings {
-        self.realtime.settings(self.priority, self.virtual_time)
-    }
 }
 
 fn speed(text: &str) -> Result<f64, String> {

@@ -2,8 +2,8 @@
 
 use supple_bus::BusError;
 use supple_model::ModelError;
-use supple_plant::{InjectionError, PlantError, PlantOptionsError, TraceError};
-use supple_realtime::StopError;
+use supple_plant::{InjectionError, PlantError, SimulationArgsError, TraceError};
+use supple_process::Failure;
 
 /// Errors in the configuration or operation of an emulator.
 #[derive(Debug, thiserror::Error)]
@@ -69,7 +69,7 @@ pub enum EmulatorError {
     Plant(#[from] PlantError),
     /// Invalid options of the plant.
     #[error(transparent)]
-    Options(#[from] PlantOptionsError),
+    Options(#[from] SimulationArgsError),
     /// Error in the description of the arm.
     #[error(transparent)]
     Model(#[from] ModelError),
@@ -96,14 +96,10 @@ pub enum EmulatorError {
         "a CAN interface runs in real time: omit --virtual-time, or use a bus over sockets, unix:FOLDER"
     )]
     VirtualInterface,
-    /// The signal handlers cannot be installed.
-    #[error(transparent)]
-    Stop(#[from] StopError),
 }
 
 impl EmulatorError {
-    /// Exit code, as for the command line: 2 for wrong use, 3 for a wrong arm, 6 for a file, 10 for the bus, 1
-    /// for the system.
+    /// Exit code, as for the command line: 2 for wrong use, 3 for a wrong arm, 6 for a file, 10 for the bus.
     pub fn code(&self) -> u8 {
         match self {
             EmulatorError::Press { .. }
@@ -122,7 +118,12 @@ impl EmulatorError {
             | EmulatorError::Model(_) => 3,
             EmulatorError::Trace(_) => 6,
             EmulatorError::Bus(_) => 10,
-            EmulatorError::Stop(_) => 1,
         }
+    }
+}
+
+impl From<EmulatorError> for Failure {
+    fn from(error: EmulatorError) -> Failure {
+        Failure::new(error.code(), error)
     }
 }

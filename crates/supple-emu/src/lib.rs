@@ -27,6 +27,7 @@ mod error;
 mod options;
 mod pendant;
 mod pendant_clients;
+mod process;
 mod program;
 mod real_time;
 mod store;

@@ -5,68 +5,38 @@ use crate::emulator::Emulator;
 use crate::error::EmulatorError;
 use crate::safety::ButtonPress;
 use clap::Parser;
-use std::path::PathBuf;
 use supple_bus::Address;
-use supple_model::{Description, ModelError, UrdfArgs};
-use supple_plant::Injection;
-use supple_realtime::{RealtimeOptions, Settings};
+use supple_plant::SimulationArgs;
+use supple_process::ProcessOptions;
 
 /// Emulates an arm on its bus, instead of a real one.
 ///
 /// A WAM starts in the emergency stop, in its home pose, held by a cradle until it is activated. Its pendant is the
 /// socket `pendant` in the bus's folder. It accepts one line per connection: idle, activate, e-stop, release,
 /// status, record, or a button with a time as in --press; the answer is a line of JSON. An arm with `[bus]` has no
-/// pendant; see --start.
+/// pendant; see --start. The arm is a WAM with 4 or 7 joints, or has `[bus]` in its TOML.
 #[derive(Clone, Debug, Parser)]
 #[command(name = "supple-emu", version)]
 pub struct Options {
-    /// A WAM with 4 or 7 joints, or an arm with `[bus]`: a built-in arm, or the path of its TOML, of its
-    /// folder, or of a URDF.
-    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
-    pub arm: String,
-    /// Treats URDF elements that are not supported as errors instead of warnings.
-    #[arg(long)]
-    pub strict: bool,
-    /// What a URDF alone does not contain.
+    /// What all periodic programs have.
     #[command(flatten)]
-    pub urdf: UrdfArgs,
-    /// Prefix of the system, if no bus is given.
-    #[arg(
-        long,
-        value_name = "NAME",
-        env = "SUPPLE_PREFIX",
-        default_value = "supple"
-    )]
-    pub prefix: String,
+    pub process: ProcessOptions,
+    /// The simulated arm.
+    #[command(flatten)]
+    pub simulation: SimulationArgs,
     /// can:NAME or unix:FOLDER; default: the sockets of the system with the prefix.
     #[arg(long, value_name = "BUS")]
     pub bus: Option<Address>,
-    /// The host advances the time; on sockets only.
-    #[arg(long)]
-    pub virtual_time: bool,
     /// Positions are known and the pucks are awake, as after a run of another program.
     #[arg(long)]
     pub zeroed: bool,
     /// Without a force/torque sensor.
     #[arg(long)]
     pub no_sensor: bool,
-    /// Adds a wooden block below the workspace; its top face is at this height above the base frame (m).
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = height)]
-    pub block_m: Option<f64>,
     /// Presses a button (idle, activate, e-stop or release) at a time (s) after the start, or after the host
     /// first commands torque (`activate@held+0.2`). May be repeated.
     #[arg(long, value_name = "BUTTON@TIME", value_parser = press)]
     pub press: Vec<ScheduledPress>,
-    /// Effects of a real arm, as TOML, or a built-in set by name; `supple plant list` has all options.
-    #[arg(long, value_name = "FILE", conflicts_with = "realistic")]
-    pub plant_options: Option<PathBuf>,
-    /// All effects of a real arm, each of modest size: `supple plant show realistic`.
-    #[arg(long)]
-    pub realistic: bool,
-    /// Injects a fault: KIND or KIND:key=value,..., for example encoder-stuck:joint=1,at-s=2; see --help. May be
-    /// repeated.
-    #[arg(long, value_name = "SPEC", long_help = supple_plant::injection::HELP)]
-    pub inject: Vec<Injection>,
     /// Lets a motor or the bus misbehave (arms with `[bus]`): KIND:motor=K,..., for example error:motor=2,code=B,at-s=1;
     /// see --help. May be repeated.
     #[arg(long, value_name = "SPEC", long_help = crate::damiao::HELP)]
@@ -78,34 +48,9 @@ pub struct Options {
     /// in which it stays without torque.
     #[arg(long, value_name = "POSE", value_enum, default_value_t = StartPose::Home)]
     pub start: StartPose,
-    /// Writes motor torques and tip forces as CSV, once per millisecond.
-    #[arg(long, value_name = "FILE")]
-    pub trace: Option<PathBuf>,
     /// Priority under SCHED_FIFO; above that of the host, because a real bus does not wait for a process.
     #[arg(long, value_name = "1-99", default_value_t = 81, value_parser = clap::value_parser!(u8).range(1..=99))]
     pub priority: u8,
-    #[command(flatten)]
-    realtime: RealtimeOptions,
-}
-
-impl Options {
-    /// The arm.
-    ///
-    /// # Errors
-    /// As [`Description::find`]; with `--strict`, also an unsupported URDF element.
-    pub fn description(&self) -> Result<Description, ModelError> {
-        Description::find(&self.urdf.name(&self.arm))?.strict_if(self.strict)
-    }
-
-    /// Whether the process must end when its parent ends.
-    pub fn supervised(&self) -> bool {
-        self.realtime.supervised
-    }
-
-    /// Real-time settings of the process.
-    pub fn realtime(&self) -> Settings {
-        self.realtime.settings(self.priority, self.virtual_time)
-    }
 }
 
 /// Where an arm without brakes starts.
@@ -115,12 +60,6 @@ pub enum StartPose {
     Home,
     /// The pose in which it stays without torque.
     Stow,
-}
-
-fn height(text: &str) -> Result<f64, String> {
-    let height = text.parse().ok();
-    let height = height.filter(|m| (-10.0..=10.0).contains(m));
-    height.ok_or_else(|| "give a height from -10 to 10 m".to_owned())
 }
 
 /// Parses the name of a button on the command line or the socket.

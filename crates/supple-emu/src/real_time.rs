@@ -38,6 +38,9 @@ pub trait EmulatedArm: EmulatedNodes {
     /// Pauses the arm for `gap_ns`.
     fn shift_clock(&mut self, gap_ns: u64);
 
+    /// Sets the monotonic clock minus the arm's clock \[ns\].
+    fn set_offset_ns(&mut self, offset_ns: u64);
+
     /// Whether a received frame is one of the host.
     fn is_from_host(&self, frame: &CanFrame) -> bool;
 }

@@ -41,6 +41,8 @@ pub mod injection;
 pub mod noise;
 pub mod scene;
 
+#[cfg(feature = "clap")]
+mod args;
 mod description;
 mod error;
 mod joint_frictions;
@@ -51,6 +53,8 @@ mod trace_file;
 mod world;
 
 pub use actuators::{ActuatorModel, Ripple, TorqueRipple};
+#[cfg(feature = "clap")]
+pub use args::{PlantArgs, SimulationArgs, SimulationArgsError};
 pub use config::{ForceSensor, HardStops, Hose, PlantConfig};
 pub use contact::{Contact, Material};
 pub use elasticity::Elasticity;

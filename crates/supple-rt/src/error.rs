@@ -4,7 +4,8 @@ use supple_core::controller::ConfigError;
 use supple_ipc::IpcError;
 use supple_ipc::message::MessageError;
 use supple_model::ModelError;
-use supple_realtime::{NotifyError, StopError};
+use supple_process::Failure;
+use supple_realtime::NotifyError;
 
 /// Why the process cannot start or continue.
 #[derive(Debug, thiserror::Error)]
@@ -21,9 +22,6 @@ pub enum RtError {
     /// The arm state is of another arm.
     #[error(transparent)]
     Message(#[from] MessageError),
-    /// Signals.
-    #[error(transparent)]
-    Stop(#[from] StopError),
     /// The service manager.
     #[error(transparent)]
     Notify(#[from] NotifyError),
@@ -41,7 +39,13 @@ impl RtError {
         match self {
             RtError::Model(_) | RtError::Config(_) => 3,
             RtError::Ipc(_) | RtError::Message(_) => 10,
-            RtError::Stop(_) | RtError::Notify(_) | RtError::Thread(_) | RtError::Helper => 1,
+            RtError::Notify(_) | RtError::Thread(_) | RtError::Helper => 1,
         }
+    }
+}
+
+impl From<RtError> for Failure {
+    fn from(error: RtError) -> Failure {
+        Failure::new(error.code(), error)
     }
 }

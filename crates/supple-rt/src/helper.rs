@@ -88,7 +88,7 @@ impl Helper {
         motion_check: MotionCheck,
         learning: Learning,
     ) -> Result<Helper, RtError> {
-        let backpressure = match options.virtual_time {
+        let backpressure = match options.process.virtual_time {
             true => Backpressure::Block,
             false => Backpressure::Drop,
         };

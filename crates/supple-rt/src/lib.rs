@@ -36,54 +36,33 @@ pub use queues::{
 pub use request_queue::{QueueFull, RequestQueue};
 pub use timing::{Percentiles, Timing};
 
-use clap::Parser;
 use std::process::ExitCode;
 use supple_core::Controller;
 use supple_ipc::{ControllerLink, Domain};
 use supple_model::{Description, with_dof};
-use supple_realtime::{
-    Heartbeat, ManagerVariables, Notifier, Stop, apply_realtime_settings, diagnostics,
-    die_with_parent,
-};
+use supple_process::{Failure, ProcessOptions, Program, RateOption};
+use supple_realtime::{Heartbeat, ManagerVariables, Notifier, Stop};
 
 /// Runs the program: parses the arguments and returns the exit code.
 pub fn main() -> ExitCode {
-    let options = Options::parse();
-    diagnostics::start();
-    let stop = match Stop::on_signals() {
-        Ok(stop) => stop,
-        Err(error) => return report_error(&error.into()),
-    };
-    if options.supervised() {
-        die_with_parent();
-    }
-    let description = match options.description() {
-        Ok(description) => description,
-        Err(error) => return report_error(&error.into()),
-    };
-    // The supervising process has already printed the warnings.
-    for warning in description
-        .warnings()
-        .iter()
-        .filter(|_| !options.supervised())
-    {
-        diagnostics::post(format_args!("supple-rt: warning: {warning}"));
-    }
-    let result = with_dof!(description.dof(), N => run::<N>(&description, &options, &stop));
-    match result.map_err(RtError::from).flatten() {
-        Ok(timing) => {
-            diagnostics::post(format_args!("supple-rt: {timing}"));
-            diagnostics::flush();
-            ExitCode::SUCCESS
-        }
-        Err(error) => report_error(&error),
-    }
+    supple_process::main::<Options>()
 }
 
-fn report_error(error: &RtError) -> ExitCode {
-    diagnostics::post(format_args!("supple-rt: error: {error}"));
-    diagnostics::flush();
-    ExitCode::from(error.code())
+impl Program for Options {
+    const NAME: &'static str = "supple-rt";
+
+    fn process(&self) -> &ProcessOptions {
+        &self.process
+    }
+
+    fn rate(&self) -> RateOption {
+        self.rate
+    }
+
+    fn run(&self, description: &Description, stop: &Stop) -> Result<Option<String>, Failure> {
+        let timing = with_dof!(description.dof(), N => run::<N>(description, self, stop))?;
+        Ok(Some(timing?.to_string()))
+    }
 }
 
 /// Runs until shutdown is requested; returns the timing statistics.
@@ -96,7 +75,7 @@ pub fn run<const N: usize>(
     stop: &Stop,
 ) -> Result<Timing, RtError> {
     let controller = Controller::new(description.config::<N>()?)?;
-    let domain = Domain::new(options.prefix.as_deref())?;
+    let domain = Domain::new(Some(&options.process.prefix))?;
     let notifier = Notifier::new(&ManagerVariables::from_environment())?;
     let link = ControllerLink::new(&domain)?;
     let (queues, helper_queues) = loop_queues();
@@ -106,14 +85,18 @@ pub fn run<const N: usize>(
     let checks = motion_check(controller);
     let helper = Helper::start(&domain, helper_queues, options, checks, learning)?;
     let (loop_channel, thread_channel) = idle_channel();
-    let idle_thread = IdleRequestThread::start(&domain, thread_channel, options.realtime())?;
-    let mut control = ControlLoop::new(controller, queues, options.virtual_time);
+    let idle_thread = IdleRequestThread::start(
+        &domain,
+        thread_channel,
+        options.process.realtime(options.priority),
+    )?;
+    let mut control = ControlLoop::new(controller, queues, options.process.virtual_time);
     let heartbeat = notifier.map(|notifier| Heartbeat::start(notifier, &counters));
     let heartbeat = heartbeat.transpose()?;
     control.set_idle_channel(loop_channel);
-    for realtime_warning in apply_realtime_settings(&options.realtime()) {
-        diagnostics::post(format_args!("supple-rt: warning: {realtime_warning}"));
-    }
+    options
+        .process
+        .apply_realtime(Options::NAME, options.priority);
     let result = control.run(&link, stop);
     drop(heartbeat);
     let timing = control.into_timing();

@@ -1,4 +1,4 @@
-//! The controller of one arm, as a process.
+//! The program `supple-rt`.
 
 fn main() -> std::process::ExitCode {
     supple_realtime::run_on_supported_processor(supple_rt::main)

@@ -3,8 +3,8 @@
 use supple_drive::{LoopError, Overload};
 use supple_ipc::IpcError;
 use supple_model::ModelError;
-use supple_plant::{InjectionError, PlantError, PlantOptionsError, TraceError};
-use supple_realtime::StopError;
+use supple_plant::{InjectionError, PlantError, SimulationArgsError, TraceError};
+use supple_process::Failure;
 
 /// Why the process cannot start or continue.
 #[derive(Debug, thiserror::Error)]
@@ -17,7 +17,7 @@ pub enum SimError {
     Plant(#[from] PlantError),
     /// Invalid options of the plant.
     #[error(transparent)]
-    Options(#[from] PlantOptionsError),
+    Options(#[from] SimulationArgsError),
     /// An invalid fault injection.
     #[error("--inject: {0}")]
     Injection(#[from] InjectionError),
@@ -33,21 +33,22 @@ pub enum SimError {
     /// The period is too short.
     #[error(transparent)]
     Rate(#[from] Box<Overload>),
-    /// Signals.
-    #[error(transparent)]
-    Stop(#[from] StopError),
 }
 
 impl SimError {
-    /// Exit code, as documented for the command line: 2 wrong use, 3 invalid arm, 6 file error, 10 shared memory, 1
-    /// system error.
+    /// Exit code, as documented for the command line: 2 wrong use, 3 invalid arm, 6 file error, 10 shared memory.
     pub fn code(&self) -> u8 {
         match self {
             SimError::Injection(_) => 2,
             SimError::Model(_) | SimError::Plant(_) | SimError::Options(_) | SimError::Rate(_) => 3,
             SimError::Trace(_) => 6,
             SimError::Ipc(_) | SimError::Loop(_) => 10,
-            SimError::Stop(_) => 1,
         }
+    }
+}
+
+impl From<SimError> for Failure {
+    fn from(error: SimError) -> Failure {
+        Failure::new(error.code(), error)
     }
 }

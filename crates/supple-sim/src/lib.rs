@@ -17,52 +17,34 @@ pub use options::Options;
 pub use simulated::SimulatedArm;
 pub use simulation::{Simulation, Summary, run as run_simulation, simulation};
 
-use clap::Parser;
 use std::process::ExitCode;
 use supple_drive::SharedMemoryLink;
 use supple_ipc::{Domain, PlantLink};
 use supple_model::{Description, with_dof};
-use supple_plant::{Plant, PlantConfig, PlantOptions, Scene, TraceFile};
-use supple_realtime::{Stop, apply_realtime_settings, diagnostics, die_with_parent, spin_duration};
+use supple_plant::{Plant, TraceFile};
+use supple_process::{Failure, ProcessOptions, Program, RateOption};
+use supple_realtime::{Stop, spin_duration};
 
 /// Runs the program: parses the arguments and returns the exit code.
 pub fn main() -> ExitCode {
-    let options = Options::parse();
-    diagnostics::start();
-    let stop = match Stop::on_signals() {
-        Ok(stop) => stop,
-        Err(error) => return report_error(&error.into()),
-    };
-    if options.supervised() {
-        die_with_parent();
-    }
-    let description = match options.description() {
-        Ok(description) => description,
-        Err(error) => return report_error(&error.into()),
-    };
-    // The supervising process has already printed the warnings.
-    for warning in description
-        .warnings()
-        .iter()
-        .filter(|_| !options.supervised())
-    {
-        diagnostics::post(format_args!("supple-sim: warning: {warning}"));
-    }
-    let result = with_dof!(description.dof(), N => run::<N>(&description, &options, &stop));
-    match result.map_err(SimError::from).flatten() {
-        Ok(summary) => {
-            diagnostics::post(format_args!("supple-sim: {summary}"));
-            diagnostics::flush();
-            ExitCode::SUCCESS
-        }
-        Err(error) => report_error(&error),
-    }
+    supple_process::main::<Options>()
 }
 
-fn report_error(error: &SimError) -> ExitCode {
-    diagnostics::post(format_args!("supple-sim: error: {error}"));
-    diagnostics::flush();
-    ExitCode::from(error.code())
+impl Program for Options {
+    const NAME: &'static str = "supple-sim";
+
+    fn process(&self) -> &ProcessOptions {
+        &self.process
+    }
+
+    fn rate(&self) -> RateOption {
+        self.rate
+    }
+
+    fn run(&self, description: &Description, stop: &Stop) -> Result<Option<String>, Failure> {
+        let summary = with_dof!(description.dof(), N => run::<N>(description, self, stop))?;
+        Ok(Some(summary?.to_string()))
+    }
 }
 
 /// Runs until shutdown is requested, or for the number of cycles in the options.
@@ -74,31 +56,28 @@ pub fn run<const N: usize>(
     options: &Options,
     stop: &Stop,
 ) -> Result<Summary, SimError> {
-    let effects = PlantOptions::chosen(
-        description,
-        options.plant_options.as_deref(),
-        options.realistic,
-    )?;
-    let mut config = effects.apply(PlantConfig::<N>::from_description(description)?)?;
-    if let Some(face_m) = options.block_m {
-        config.scene = Scene::with_block_at(face_m);
-    }
+    let config = options.simulation.config::<N>(description)?;
     let home_rad = description.home::<N>()?;
     let plant = Plant::new(config, home_rad, supple_core::Vector::zeros())?;
-    let domain = Domain::new(options.prefix.as_deref())?;
+    let domain = Domain::new(Some(&options.process.prefix))?;
     let link = PlantLink::new(&domain)?;
-    let mut link = SharedMemoryLink::new(link, options.virtual_time, stop.clone());
-    let mut arm = SimulatedArm::new(plant, options.virtual_time, options.answer_share);
-    arm.inject(&options.inject)?;
-    if let Some(file) = &options.trace {
+    let mut link = SharedMemoryLink::new(link, options.process.virtual_time, stop.clone());
+    let mut arm = SimulatedArm::new(plant, options.process.virtual_time, options.answer_share);
+    arm.inject(&options.simulation.inject)?;
+    if let Some(file) = &options.simulation.trace {
         arm.trace(TraceFile::create(file, N)?);
     }
-    for realtime_warning in apply_realtime_settings(&options.realtime()) {
-        diagnostics::post(format_args!("supple-sim: warning: {realtime_warning}"));
-    }
+    options
+        .process
+        .apply_realtime(Options::NAME, options.priority);
     link.spin(spin_duration(options.spin_us));
     let mut simulation = simulation(arm, link, &description.config()?)?;
-    let result = run_simulation(&mut simulation, options.cycles, options.virtual_time, stop);
+    let result = run_simulation(
+        &mut simulation,
+        options.cycles,
+        options.process.virtual_time,
+        stop,
+    );
     let summary = result?;
     simulation.drive_mut().end_trace()?;
     Ok(summary)

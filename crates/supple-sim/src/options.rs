@@ -1,10 +1,8 @@
 //! Command-line options.
 
 use clap::Parser;
-use std::path::PathBuf;
-use supple_model::{Description, ModelError, UrdfArgs};
-use supple_plant::Injection;
-use supple_realtime::{RealtimeOptions, Settings};
+use supple_plant::SimulationArgs;
+use supple_process::{ProcessOptions, RateOption};
 
 /// A simulated arm on shared memory; replaces `supple-can` and a real arm.
 ///
@@ -13,40 +11,15 @@ use supple_realtime::{RealtimeOptions, Settings};
 #[derive(Clone, Debug, Parser)]
 #[command(name = "supple-sim", version)]
 pub struct Options {
-    /// A built-in arm (see `supple arms`), or the path of an arm's TOML, of its folder, or of a URDF.
-    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
-    pub arm: String,
-    /// Treats URDF elements that are not supported as errors instead of warnings.
-    #[arg(long)]
-    pub strict: bool,
-    /// What a URDF alone does not contain.
+    /// What all periodic programs have.
     #[command(flatten)]
-    pub urdf: UrdfArgs,
-    /// Cycles per second; the arm's own if not given. All processes of a system need the same.
-    #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(10..=10_000))]
-    pub rate_hz: Option<u32>,
-    /// Prefix of the system; SUPPLE_PREFIX or `supple` if not given.
-    #[arg(long, value_name = "NAME")]
-    pub prefix: Option<String>,
-    /// Runs in lockstep: each cycle waits for its answer before the next one starts.
-    #[arg(long)]
-    pub virtual_time: bool,
-    /// Adds a wooden block below the workspace; its top face is at this height above the base frame (m).
-    #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = height)]
-    pub block_m: Option<f64>,
-    /// Writes joint torques and tip forces to a CSV file every millisecond.
-    #[arg(long, value_name = "FILE")]
-    pub trace: Option<PathBuf>,
-    /// Effects of a real arm, as TOML, or a built-in set by name; `supple plant list` has all options.
-    #[arg(long, value_name = "FILE", conflicts_with = "realistic")]
-    pub plant_options: Option<PathBuf>,
-    /// All effects of a real arm, each of modest size: `supple plant show realistic`.
-    #[arg(long)]
-    pub realistic: bool,
-    /// Injects a fault: KIND or KIND:key=value,..., for example encoder-stuck:joint=1,at-s=2; see --help. May be
-    /// repeated.
-    #[arg(long, value_name = "SPEC", long_help = supple_plant::injection::HELP)]
-    pub inject: Vec<Injection>,
+    pub process: ProcessOptions,
+    /// The simulated arm.
+    #[command(flatten)]
+    pub simulation: SimulationArgs,
+    /// The rate.
+    #[command(flatten)]
+    pub rate: RateOption,
     /// Ends after this number of cycles.
     #[arg(long, value_name = "N")]
     pub cycles: Option<u64>,
@@ -60,34 +33,6 @@ pub struct Options {
     /// Priority under SCHED_FIFO.
     #[arg(long, value_name = "1-99", default_value_t = 79, value_parser = clap::value_parser!(u8).range(1..=99))]
     pub priority: u8,
-    #[command(flatten)]
-    realtime: RealtimeOptions,
-}
-
-impl Options {
-    /// Loads the arm at the requested rate.
-    ///
-    /// # Errors
-    /// As [`Description::find_at_rate`]; with `--strict`, also an unsupported URDF element.
-    pub fn description(&self) -> Result<Description, ModelError> {
-        Description::find_at_rate(&self.urdf.name(&self.arm), self.rate_hz)?.strict_if(self.strict)
-    }
-
-    /// Whether the process must end when its parent ends.
-    pub fn supervised(&self) -> bool {
-        self.realtime.supervised
-    }
-
-    /// Realtime settings of the loop's thread.
-    pub fn realtime(&self) -> Settings {
-        self.realtime.settings(self.priority, self.virtual_time)
-    }
-}
-
-fn height(text: &str) -> Result<f64, String> {
-    let height = text.parse().ok();
-    let height = height.filter(|m| (-10.0..=10.0).contains(m));
-    height.ok_or_else(|| "give a height from -10 to 10 m".to_owned())
 }
 
 fn share(text: &str) -> Result<f64, String> {

@@ -16,8 +16,9 @@ pub use identification::{
 };
 pub use log::{LogCommand, LogDataCommand, PlotArgs};
 pub use new::NewArgs;
-pub use plant::{PlantArgs, PlantCommand};
+pub use plant::PlantCommand;
 pub use supple_model::UrdfArgs;
+pub use supple_plant::PlantArgs;
 
 use crate::exit::CODES;
 use clap::{Args, Subcommand};

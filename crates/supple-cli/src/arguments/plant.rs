@@ -1,47 +1,11 @@
-//! Options of the simulated arm, and `supple plant`.
+//! `supple plant`.
 
 use crate::console::{print_json, print_line};
 use crate::exit::Failure;
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use serde::Serialize;
-use std::path::PathBuf;
-use supple_model::Description;
 use supple_plant::PlantOptions;
 use supple_plant::options::OPTIONS;
-
-/// Effects of a real arm in the simulated one.
-#[derive(Clone, Debug, Default, Args)]
-pub struct PlantArgs {
-    /// Effects of a real arm in the simulated one, as TOML, or a built-in set by name; `supple plant list` has all options.
-    #[arg(long, value_name = "FILE", conflicts_with = "realistic")]
-    pub plant_options: Option<PathBuf>,
-    /// Give the simulated arm all effects of a real one, each of modest size: the set `realistic`, `openarm-realistic` or
-    /// `urdf-realistic` of `supple plant show`, for motors with cables, motors with gears on a bus, or motors that the arm's
-    /// TOML does not describe.
-    #[arg(long)]
-    pub realistic: bool,
-}
-
-impl PlantArgs {
-    /// Reads and checks the options for `arm`.
-    ///
-    /// # Errors
-    /// [`Failure::PlantOptions`].
-    pub fn options(&self, arm: &Description) -> Result<PlantOptions, Failure> {
-        let file = self.plant_options.as_deref();
-        Ok(PlantOptions::chosen(arm, file, self.realistic)?)
-    }
-
-    /// The same on the command line of another process.
-    pub fn to_arguments(&self) -> Vec<String> {
-        let mut arguments = Vec::new();
-        if let Some(file) = &self.plant_options {
-            arguments.extend(["--plant-options".to_owned(), file.display().to_string()]);
-        }
-        arguments.extend(self.realistic.then(|| "--realistic".to_owned()));
-        arguments
-    }
-}
 
 /// Command of `supple plant`.
 #[derive(Clone, Debug, Subcommand)]

@@ -1,25 +1,20 @@
-//! The process with an arm of Damiao motors: in real time, or as its host advances it.
+//! The process with an arm of Damiao motors.
 
 use super::arm::{DamiaoArm, MotorEvent};
 use super::config::DamiaoConfig;
 use crate::error::EmulatorError;
 use crate::options::{Options, StartPose};
-use crate::real_time::{EmulatedArm, advance_to_bus_time, receive_host_frame};
-use supple_bus::virtual_time::{EmulatedNodes, LockstepResponder};
-use supple_bus::{Address, OwnerFolder, PacedResponder, SocketCan};
+use crate::process::{ArmProcess, serve};
+use crate::real_time::EmulatedArm;
+use supple_bus::Address;
+use supple_bus::virtual_time::EmulatedNodes;
 use supple_can_frame::CanFrame;
 use supple_core::Vector;
 use supple_damiao::Status;
 use supple_model::Description;
-use supple_plant::{PlantConfig, PlantOptions, Sample, Scene, TraceFile};
-use supple_realtime::{Stop, apply_realtime_settings, diagnostics, monotonic_ns};
-
-/// Maximum wait in virtual time, which pauses while the host is silent \[ns\].
-const IDLE_NS: u64 = 10_000_000;
-/// Time for which the process serves its host after a shutdown was requested \[ns\]: the host lays the arm down first.
-const SHUTDOWN_TIMEOUT_NS: u64 = 30_000_000_000;
-/// Time for which it continues after all motors are disabled \[ns\].
-const FINAL_REPORT_NS: u64 = 50_000_000;
+use supple_plant::{Sample, TraceFile};
+use supple_process::Program;
+use supple_realtime::{Stop, diagnostics, monotonic_ns};
 
 impl<const N: usize> EmulatedArm for DamiaoArm<N> {
     fn next_ns(&self) -> u64 {
@@ -28,6 +23,10 @@ impl<const N: usize> EmulatedArm for DamiaoArm<N> {
 
     fn shift_clock(&mut self, gap_ns: u64) {
         DamiaoArm::shift_clock(self, gap_ns);
+    }
+
+    fn set_offset_ns(&mut self, offset_ns: u64) {
+        DamiaoArm::set_offset_ns(self, offset_ns);
     }
 
     fn is_from_host(&self, _: &CanFrame) -> bool {
@@ -57,15 +56,7 @@ pub(crate) fn run<const N: usize>(
     let bus = description.bus().ok_or(missing("[bus]"))?;
     let mut config = DamiaoConfig::expected(bus);
     config.allow_flash = options.allow_flash;
-    let effects = PlantOptions::chosen(
-        description,
-        options.plant_options.as_deref(),
-        options.realistic,
-    )?;
-    let mut plant = effects.apply(PlantConfig::<N>::from_description(description)?)?;
-    if let Some(face_m) = options.block_m {
-        plant.scene = Scene::with_block_at(face_m);
-    }
+    let plant = options.simulation.config::<N>(description)?;
     let soft_zone_rad = description.settings().limits.soft_zone_rad;
     let stow_rad = description.stow_rad().map(Vector::from_column_slice);
     let start_rad = match options.start {
@@ -76,62 +67,37 @@ pub(crate) fn run<const N: usize>(
             stow_rad.ok_or(missing("stow_rad"))?
         }
     };
-    let start_ns = if options.virtual_time {
+    let start_ns = if options.process.virtual_time {
         0
     } else {
         monotonic_ns()
     };
     let stow = stow_rad.map(|stow_rad| (stow_rad, soft_zone_rad));
     let mut arm = DamiaoArm::new(config, plant, start_rad, stow, start_ns)?;
-    arm.inject(&options.inject, description.config::<N>()?.period_s)?;
+    arm.inject(
+        &options.simulation.inject,
+        description.config::<N>()?.period_s,
+    )?;
     arm.misbehave(&options.misbehave)?;
-    let trace = match &options.trace {
+    let trace = match &options.simulation.trace {
         Some(path) => Some(TraceFile::create(path, N)?),
         None => None,
     };
-    let own = Address::of_system(&options.prefix)?;
+    let own = Address::of_system(&options.process.prefix)?;
     let address = options.bus.clone().unwrap_or_else(|| own.clone());
     diagnostics::post(format_args!(
         "supple-emu: {} on {address}",
         description.name()
     ));
-    for realtime_warning in apply_realtime_settings(&options.realtime()) {
-        diagnostics::post(format_args!("supple-emu: warning: {realtime_warning}"));
-    }
+    options
+        .process
+        .apply_realtime(Options::NAME, options.priority);
     let mut process = Process {
         arm,
         trace,
-        until_ns: None,
-        disabled: false,
         reported: 0,
     };
-    match (&address, options.virtual_time) {
-        (Address::Folder(folder), true) => {
-            let mut responder = LockstepResponder::open(&OwnerFolder::open(folder.clone())?)?;
-            while !process.is_finished(stop) {
-                responder.serve(&mut process.arm, IDLE_NS)?;
-                process.report();
-            }
-        }
-        (Address::Folder(folder), false) => {
-            let folder = OwnerFolder::open(folder.clone())?;
-            let mut responder = PacedResponder::open(&folder, start_ns)?;
-            while !process.is_finished(stop) {
-                responder.serve(&mut process.arm)?;
-                process.arm.set_offset_ns(responder.offset_ns());
-                process.report();
-            }
-        }
-        (Address::Interface(name), false) => {
-            let mut can = SocketCan::open(name)?;
-            while !process.is_finished(stop) {
-                advance_to_bus_time(&mut process.arm, &mut can)?;
-                process.report();
-                receive_host_frame(&mut process.arm, &mut can)?;
-            }
-        }
-        (Address::Interface(_), true) => return Err(EmulatorError::VirtualInterface),
-    }
+    serve(&mut process, &address, options.process.virtual_time, stop)?;
     match process.trace.take() {
         Some(trace) => Ok(trace.finish()?),
         None => Ok(()),
@@ -141,12 +107,28 @@ pub(crate) fn run<const N: usize>(
 struct Process<const N: usize> {
     arm: DamiaoArm<N>,
     trace: Option<TraceFile>,
-    /// End of the shutdown, once requested \[ns\].
-    until_ns: Option<u64>,
-    /// Whether all motors were disabled during the shutdown.
-    disabled: bool,
     /// Number of events that were reported on standard error.
     reported: usize,
+}
+
+impl<const N: usize> ArmProcess for Process<N> {
+    type Arm = DamiaoArm<N>;
+
+    /// The host lays the arm down first.
+    const SHUTDOWN_TIMEOUT_NS: u64 = 30_000_000_000;
+
+    fn arm(&mut self) -> &mut DamiaoArm<N> {
+        &mut self.arm
+    }
+
+    fn has_torque(&self) -> bool {
+        self.enabled() > 0
+    }
+
+    fn attend(&mut self) {
+        self.write_trace();
+        self.report_events();
+    }
 }
 
 impl<const N: usize> Process<N> {
@@ -157,9 +139,8 @@ impl<const N: usize> Process<N> {
             .count()
     }
 
-    /// Writes the trace, and reports new events.
-    fn report(&mut self) {
-        self.write_trace();
+    /// Reports the events since the last call.
+    fn report_events(&mut self) {
         let events = self.arm.events();
         // By the machine's clock, as the trace.
         let offset_ns = self.arm.monotonic_ns() - self.arm.now_ns();
@@ -210,20 +191,5 @@ impl<const N: usize> Process<N> {
             };
             trace.write_sample(&sample, self.arm.plant_mut());
         }
-    }
-
-    fn is_finished(&mut self, stop: &Stop) -> bool {
-        if !stop.shutdown_requested() {
-            return false;
-        }
-        let now_ns = monotonic_ns();
-        let none_enabled = self.enabled() == 0;
-        let until_ns = self.until_ns.get_or_insert(now_ns + SHUTDOWN_TIMEOUT_NS);
-        if none_enabled && !self.disabled {
-            // The host must still receive the last replies.
-            self.disabled = true;
-            *until_ns = (*until_ns).min(now_ns + FINAL_REPORT_NS);
-        }
-        now_ns > *until_ns
     }
 }

@@ -16,15 +16,16 @@ pub use cycle::{Cycle, cycle};
 pub use drive::Barrett;
 pub use error::CanError;
 
-use crate::backend::{DriveBackend, RunError};
+use crate::backend::DriveBackend;
+use supple_process::Failure;
 
 /// Line of the registry: every arm without another make.
 pub const BACKEND: DriveBackend = DriveBackend {
     name: "barrett",
     supports: |_| true,
     run: |description, options, stop| match program::run(description, options, stop) {
-        Err(CanError::Stopped) => Err(RunError::Stopped),
-        Err(error) => Err(RunError::new(error.code(), error)),
+        Err(CanError::Stopped) => Ok(None),
+        Err(error) => Err(Failure::new(error.code(), error)),
         Ok(counters) => Ok(counters),
     },
 };

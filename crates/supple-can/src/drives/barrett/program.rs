@@ -10,8 +10,9 @@ use supple_bus::{Address, BusError};
 use supple_drive::{Counters, CycleConfig, SharedMemoryLink};
 use supple_ipc::{Domain, PlantLink};
 use supple_model::{Description, with_dof};
+use supple_process::Program;
 use supple_puck::safety::{SafetyLimits, SpeedLimit};
-use supple_realtime::{Stop, apply_realtime_settings, diagnostics, pause, spin_duration};
+use supple_realtime::{Stop, diagnostics, pause, spin_duration};
 
 /// Runs an arm until a shutdown is requested or all cycles have run and returns its counters; `None` if only the budget of the bus
 /// was requested.
@@ -57,16 +58,16 @@ fn run_joints<const N: usize>(
         .speed_warning
         .min(startup_config.limits.speed_fault);
     startup_config.limits.speed_warning = warning;
-    let domain = Domain::new(options.prefix.as_deref())?;
+    let domain = Domain::new(Some(&options.process.prefix))?;
     // A process that was killed while it asked has left its question.
     domain.home_files().withdraw();
     let link = PlantLink::new(&domain)?;
-    let mut link = SharedMemoryLink::new(link, options.virtual_time, stop.clone());
+    let mut link = SharedMemoryLink::new(link, options.process.virtual_time, stop.clone());
     let address = match &options.bus {
         Some(address) => address.clone(),
         None => Address::of_system(domain.prefix())?,
     };
-    let mut bus = open(address, options.virtual_time, stop)?;
+    let mut bus = open(address, options.process.virtual_time, stop)?;
     let mut counters = Counters::default();
     let mut first = true;
     loop {
@@ -95,9 +96,9 @@ fn run_joints<const N: usize>(
             Err(error) => return Err(error),
         };
         if first {
-            for realtime_warning in apply_realtime_settings(&options.realtime()) {
-                diagnostics::post(format_args!("supple-can: warning: {realtime_warning}"));
-            }
+            options
+                .process
+                .apply_realtime(Options::NAME, options.priority);
             link.spin(spin_duration(options.spin_us));
         }
         first = false;

@@ -16,8 +16,9 @@ pub use motor::Motor;
 pub use program::{DamiaoLoop, stow_config, with_drive};
 pub use start_up::{rates, start_up};
 
-use crate::backend::{DriveBackend, RunError};
+use crate::backend::DriveBackend;
 use supple_model::BusKind;
+use supple_process::Failure;
 
 /// Line of the registry.
 pub const BACKEND: DriveBackend = DriveBackend {
@@ -28,8 +29,8 @@ pub const BACKEND: DriveBackend = DriveBackend {
             .is_some_and(|bus| bus.kind == BusKind::Damiao)
     },
     run: |description, options, stop| match program::run(description, options, stop) {
-        Err(DamiaoError::Stopped) => Err(RunError::Stopped),
-        Err(error) => Err(RunError::new(error.code(), error)),
+        Err(DamiaoError::Stopped) => Ok(None),
+        Err(error) => Err(Failure::new(error.code(), error)),
         Ok(counters) => Ok(counters),
     },
 };

@@ -11,7 +11,8 @@ use supple_core::{Config, Vector};
 use supple_drive::{Counters, CycleConfig, Link, PlantLoop, SharedMemoryLink, StowConfig};
 use supple_ipc::{Domain, PlantLink};
 use supple_model::{Description, with_dof};
-use supple_realtime::{Stop, apply_realtime_settings, diagnostics, pause, spin_duration};
+use supple_process::Program;
+use supple_realtime::{Stop, diagnostics, pause, spin_duration};
 
 /// Speed of the joints while the arm is laid down \[rad/s\].
 const STOW_SPEED_RAD_PER_S: f64 = 0.4;
@@ -95,14 +96,14 @@ fn run_joints<const N: usize>(
     if options.budget {
         return Ok(None);
     }
-    let domain = Domain::new(options.prefix.as_deref())?;
+    let domain = Domain::new(Some(&options.process.prefix))?;
     let link = PlantLink::new(&domain)?;
-    let mut link = SharedMemoryLink::new(link, options.virtual_time, stop.clone());
+    let mut link = SharedMemoryLink::new(link, options.process.virtual_time, stop.clone());
     let address = match &options.bus {
         Some(address) => address.clone(),
         None => Address::of_system(domain.prefix())?,
     };
-    let mut bus = open(address, options.virtual_time, stop)?;
+    let mut bus = open(address, options.process.virtual_time, stop)?;
     let mut counters = Counters::default();
     let mut first = true;
     loop {
@@ -124,9 +125,9 @@ fn run_joints<const N: usize>(
             "supple-can: {N} motors ready; the arm has no brakes: support it, or let it lie, until gravity hold"
         ));
         if first {
-            for realtime_warning in apply_realtime_settings(&options.realtime()) {
-                diagnostics::post(format_args!("supple-can: warning: {realtime_warning}"));
-            }
+            options
+                .process
+                .apply_realtime(Options::NAME, options.priority);
             link.spin(spin_duration(options.spin_us));
         }
         let restarted = !first;
