@@ -17,6 +17,7 @@ mod backend;
 mod cycles;
 mod options;
 mod program;
+mod run;
 
 pub use backend::DriveBackend;
 pub use drives::barrett::bus_time::{Budget, BusTime, Overload};

@@ -78,10 +78,10 @@ impl<const N: usize> Task<N, 3> {
     /// positive definite.
     #[inline(always)]
     pub fn new(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N, 3>> {
-        Task::with_count(terms, roles, count_active(roles))
+        Task::from_terms(terms, roles)
     }
 
-    /// As [`Task::new`], for a caller that has counted the active joints before.
+    /// As [`Task::new`], for a caller that has counted the active joints before and reads the smallest singular value.
     #[inline(always)]
     pub(crate) fn with_count(
         terms: &Terms<N>,
@@ -104,8 +104,9 @@ impl<const N: usize> Task<N, 6> {
 }
 
 impl<const N: usize, const D: usize> Task<N, D> {
-    /// As [`Task::new`] and [`Task::of_pose`], for `law::sum`. Far from a singular pose a cheap bound shows that the position needs no
-    /// damping, so that no other result depends on the smallest singular value, whose computation takes as long as the rest.
+    /// The task in `D` directions. Far from a singular pose a cheap bound shows that the position needs no damping: nothing else
+    /// then depends on the smallest singular value, whose computation takes as long as the rest and is left out where nobody
+    /// reads it.
     #[inline(always)]
     pub(crate) fn from_terms(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N, D>> {
         let active = count_active(roles);

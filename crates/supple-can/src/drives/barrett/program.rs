@@ -1,18 +1,19 @@
-//! A run with Barrett's drives: start-up, then cycles; repeated after the arm has lost its power.
+//! A run with Barrett's drives.
 
 use super::bus_time::BusTime;
-use super::cycle::cycle;
+use super::cycle::{Cycle, cycle};
+use super::drive::Barrett;
 use super::error::CanError;
-use super::start_up::{Progress, StartupConfig, start_up};
-use crate::cycles::{Ended, SEARCH_INTERVAL, open, run_until_shutdown, sum_counters};
+use super::start_up::{Progress, Ready, StartupConfig, start_up};
 use crate::options::{Options, print_budget};
-use supple_bus::{Address, BusError};
+use crate::run::{Startup, run_arm};
+use supple_bus::{Bus, BusError};
+use supple_core::{Config, Vector};
 use supple_drive::{Counters, CycleConfig, SharedMemoryLink};
-use supple_ipc::{Domain, PlantLink};
+use supple_ipc::Domain;
 use supple_model::{Description, with_dof};
-use supple_process::Program;
 use supple_puck::safety::{SafetyLimits, SpeedLimit};
-use supple_realtime::{Stop, diagnostics, pause, spin_duration};
+use supple_realtime::{Stop, diagnostics};
 
 /// Runs an arm until a shutdown is requested or all cycles have run and returns its counters; `None` if only the budget of the bus
 /// was requested.
@@ -33,7 +34,6 @@ fn run_joints<const N: usize>(
     stop: &Stop,
 ) -> Result<Option<Counters>, CanError> {
     let config = description.config::<N>()?;
-    let home_rad = description.home::<N>()?;
     let cycle_config = CycleConfig {
         period_ns: (config.period_s * 1e9).round() as u64,
         answer_ns: options.answer_us * 1_000,
@@ -44,83 +44,92 @@ fn run_joints<const N: usize>(
         time.check(cycle_config.period_ns)?;
         return Ok(None);
     }
-    let mut startup_config = StartupConfig {
-        zero_at_rad: options.zero_at_home.then_some(home_rad),
-        ask: None,
-        limits: SafetyLimits {
-            speed_fault: SpeedLimit::from_m_per_s(options.speed_limit_m_per_s).ok(),
-            ..SafetyLimits::default()
-        },
-        tare: options.tare,
+    let speed_fault = SpeedLimit::from_m_per_s(options.speed_limit_m_per_s).ok();
+    let defaults = SafetyLimits::default();
+    let limits = SafetyLimits {
+        speed_fault,
+        speed_warning: defaults.speed_warning.min(speed_fault),
+        ..defaults
     };
-    let warning = startup_config
-        .limits
-        .speed_warning
-        .min(startup_config.limits.speed_fault);
-    startup_config.limits.speed_warning = warning;
     let domain = Domain::new(Some(&options.process.prefix))?;
     // A process that was killed while it asked has left its question.
     domain.home_files().withdraw();
-    let link = PlantLink::new(&domain)?;
-    let mut link = SharedMemoryLink::new(link, options.process.virtual_time, stop.clone());
-    let address = match &options.bus {
-        Some(address) => address.clone(),
-        None => Address::of_system(domain.prefix())?,
+    let mut startup = Pucks {
+        description,
+        options,
+        domain: &domain,
+        config: &config,
+        cycle_config,
+        home_rad: description.home::<N>()?,
+        limits,
     };
-    let mut bus = open(address, options.process.virtual_time, stop)?;
-    let mut counters = Counters::default();
-    let mut first = true;
-    loop {
+    run_arm(&mut startup, &domain, &config, options, stop).map(Some)
+}
+
+/// Start-up of the pucks.
+struct Pucks<'a, const N: usize> {
+    description: &'a Description,
+    options: &'a Options,
+    domain: &'a Domain,
+    config: &'a Config<N>,
+    cycle_config: CycleConfig,
+    home_rad: Vector<N>,
+    limits: SafetyLimits,
+}
+
+impl<const N: usize> Startup<N> for Pucks<'_, N> {
+    type Drive = Barrett<N, Box<dyn Bus>>;
+    type Ready = Ready<N>;
+    type Error = CanError;
+
+    fn prepare(
+        &mut self,
+        bus: &mut Box<dyn Bus>,
+        first: bool,
+        stop: &Stop,
+    ) -> Result<Ready<N>, CanError> {
+        // An arm falls while it has no power: only at the first start-up may it be in its home pose, and its sensor
+        // unloaded, because an option says so.
+        let startup_config = StartupConfig {
+            zero_at_rad: (first && self.options.zero_at_home).then_some(self.home_rad),
+            ask: (!first).then(|| self.domain.home_files()),
+            limits: self.limits,
+            tare: first && self.options.tare,
+        };
         let stop_requested = || stop.shutdown_requested();
-        let ready = start_up(
-            &mut bus,
-            description,
+        start_up(
+            bus,
+            self.description,
             &startup_config,
             &stop_requested,
             &mut report_progress,
-        );
-        let ready = match ready {
-            Ok(ready) => ready,
-            // After a power loss keep trying; the other processes continue meanwhile.
-            Err(
-                CanError::Missing { .. }
-                // Once more the emergency stop.
+        )
+    }
+
+    fn may_recover(error: &CanError) -> bool {
+        matches!(
+            error,
+            CanError::Missing { .. }
+                // The emergency stop is pressed again.
                 | CanError::Mode { .. }
                 | CanError::BusFault(_)
                 // Unacknowledged frames fill the transmit queue.
-                | CanError::Bus(BusError::Full),
-            ) if !first && !stop.shutdown_requested() => {
-                pause(SEARCH_INTERVAL);
-                continue;
-            }
-            Err(error) => return Err(error),
-        };
-        if first {
-            options
-                .process
-                .apply_realtime(Options::NAME, options.priority);
-            link.spin(spin_duration(options.spin_us));
-        }
-        first = false;
-        // An arm falls while it has no power: it is in its home pose, and its sensor unloaded, at the first start-up alone.
-        startup_config = StartupConfig {
-            zero_at_rad: None,
-            ask: Some(domain.home_files()),
-            tare: false,
-            ..startup_config
-        };
-        let mut plant = cycle(bus, link, ready, &config, cycle_config)?;
-        let names = config.joint_names;
-        let ended = run_until_shutdown(&mut plant, options.cycles, stop, names.as_slice())?;
-        counters = sum_counters(&counters, plant.counters());
-        let (drive, used_link) = plant.into_parts();
-        (bus, link) = (drive.into_bus(), used_link);
-        if ended == Ended::ShutDown {
-            return Ok(Some(counters));
-        }
-        diagnostics::post(format_args!(
-            "supple-can: the arm does not reply any more: searching for it"
-        ));
+                | CanError::Bus(BusError::Full)
+        )
+    }
+
+    fn plant_loop(
+        &self,
+        bus: Box<dyn Bus>,
+        link: SharedMemoryLink,
+        ready: Ready<N>,
+        _: bool,
+    ) -> Result<Cycle<N, Box<dyn Bus>, SharedMemoryLink>, CanError> {
+        cycle(bus, link, ready, self.config, self.cycle_config)
+    }
+
+    fn into_bus(drive: Self::Drive) -> Box<dyn Bus> {
+        drive.into_bus()
     }
 }
 

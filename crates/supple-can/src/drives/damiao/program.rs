@@ -1,18 +1,18 @@
-//! A run with Damiao motors: start-up, then cycles; repeated after the arm has lost its power.
+//! A run with Damiao motors.
 
+use super::Motor;
 use super::drive::{Damiao, budget};
 use super::error::DamiaoError;
 use super::start_up::{rates, start_up};
-use crate::cycles::{Ended, SEARCH_INTERVAL, open, run_until_shutdown, sum_counters};
 use crate::options::{Options, print_budget};
-use supple_bus::{Address, Bus, BusError};
+use crate::run::{Startup, run_arm};
+use supple_bus::{Bus, BusError};
 use supple_can_frame::BitRates;
 use supple_core::{Config, Vector};
 use supple_drive::{Counters, CycleConfig, Link, PlantLoop, SharedMemoryLink, StowConfig};
-use supple_ipc::{Domain, PlantLink};
+use supple_ipc::Domain;
 use supple_model::{Description, with_dof};
-use supple_process::Program;
-use supple_realtime::{Stop, diagnostics, pause, spin_duration};
+use supple_realtime::{Stop, diagnostics};
 
 /// Speed of the joints while the arm is laid down \[rad/s\].
 const STOW_SPEED_RAD_PER_S: f64 = 0.4;
@@ -97,56 +97,72 @@ fn run_joints<const N: usize>(
         return Ok(None);
     }
     let domain = Domain::new(Some(&options.process.prefix))?;
-    let link = PlantLink::new(&domain)?;
-    let mut link = SharedMemoryLink::new(link, options.process.virtual_time, stop.clone());
-    let address = match &options.bus {
-        Some(address) => address.clone(),
-        None => Address::of_system(domain.prefix())?,
+    let mut startup = Motors {
+        description,
+        config: &config,
+        cycle_config,
     };
-    let mut bus = open(address, options.process.virtual_time, stop)?;
-    let mut counters = Counters::default();
-    let mut first = true;
-    loop {
+    run_arm(&mut startup, &domain, &config, options, stop).map(Some)
+}
+
+/// Start-up of the motors.
+struct Motors<'a, const N: usize> {
+    description: &'a Description,
+    config: &'a Config<N>,
+    cycle_config: CycleConfig,
+}
+
+impl<const N: usize> Startup<N> for Motors<'_, N> {
+    type Drive = Damiao<N, Box<dyn Bus>>;
+    type Ready = [Motor; N];
+    type Error = DamiaoError;
+
+    fn prepare(
+        &mut self,
+        bus: &mut Box<dyn Bus>,
+        _: bool,
+        stop: &Stop,
+    ) -> Result<[Motor; N], DamiaoError> {
         let stop_requested = || stop.shutdown_requested();
-        let motors = match start_up::<N, _>(&mut bus, description, &stop_requested) {
-            Ok(motors) => motors,
-            // After a power loss keep trying; the other processes continue meanwhile.
-            Err(
-                DamiaoError::Refused { .. }
-                | DamiaoError::BusFault(_)
-                | DamiaoError::Bus(BusError::Full),
-            ) if !first && !stop.shutdown_requested() => {
-                pause(SEARCH_INTERVAL);
-                continue;
-            }
-            Err(error) => return Err(error),
-        };
+        let motors = start_up::<N, _>(bus, self.description, &stop_requested)?;
         diagnostics::post(format_args!(
             "supple-can: {N} motors ready; the arm has no brakes: support it, or let it lie, until gravity hold"
         ));
-        if first {
-            options
-                .process
-                .apply_realtime(Options::NAME, options.priority);
-            link.spin(spin_duration(options.spin_us));
-        }
-        let restarted = !first;
-        first = false;
-        let mut plant = with_drive(bus, link, motors, description, &config, cycle_config)?;
-        if restarted {
+        Ok(motors)
+    }
+
+    fn may_recover(error: &DamiaoError) -> bool {
+        matches!(
+            error,
+            DamiaoError::Refused { .. }
+                | DamiaoError::BusFault(_)
+                | DamiaoError::Bus(BusError::Full)
+        )
+    }
+
+    fn plant_loop(
+        &self,
+        bus: Box<dyn Bus>,
+        link: SharedMemoryLink,
+        motors: [Motor; N],
+        first: bool,
+    ) -> Result<DamiaoLoop<N, Box<dyn Bus>, SharedMemoryLink>, DamiaoError> {
+        let mut plant = with_drive(
+            bus,
+            link,
+            motors,
+            self.description,
+            self.config,
+            self.cycle_config,
+        )?;
+        if !first {
             plant.drive_mut().latch();
         }
-        let names = config.joint_names;
-        let ended = run_until_shutdown(&mut plant, options.cycles, stop, names.as_slice())?;
-        counters = sum_counters(&counters, plant.counters());
-        let (drive, used_link) = plant.into_parts();
-        (bus, link) = (drive.into_bus(), used_link);
-        if ended == Ended::ShutDown {
-            return Ok(Some(counters));
-        }
-        diagnostics::post(format_args!(
-            "supple-can: the arm does not reply any more: searching for it"
-        ));
+        Ok(plant)
+    }
+
+    fn into_bus(drive: Self::Drive) -> Box<dyn Bus> {
+        drive.into_bus()
     }
 }
 
