@@ -4,7 +4,9 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 PLAIN=(fmt clippy test doctest doc)
-FULL=(deny advisories page python package impact ur10e urdfs instructions fused edits cycles fuzz cortex-m socketcan services)
+FULL=(deny advisories page package urdfs instructions fused edits cycles fuzz cortex-m)
+# Also of the full run: each computes on one processor or waits, so they run one after the other beside those above.
+BESIDE=(ur10e python impact services socketcan)
 CARGO_DENY_VERSION=0.20.2
 CARGO_FUZZ_VERSION=0.13.2
 GUNGRAUN_VERSION=0.20.0
@@ -321,27 +323,28 @@ needs_command() {
 }
 
 needs_package() {
-    local install="apt-get install --yes --no-install-recommends $1"
+    local install="apt-get install --yes --no-install-recommends $1" log=$WORK/apt-$1.log
     command -v apt-get >/dev/null || skip "needs the package $1"
     [[ $(id -u) == 0 ]] || skip "needs the package $1: sudo $install"
     export DEBIAN_FRONTEND=noninteractive
-    { apt-get update && $install; } >"$WORK/apt.log" 2>&1 || {
-        tail -n 5 "$WORK/apt.log"
+    # One at a time: a step beside this one may install, too.
+    (flock 9 && apt-get update && $install) 9>"$WORK/apt.lock" >"$log" 2>&1 || {
+        tail -n 5 "$log"
         skip "the package $1 cannot be installed"
     }
 }
 
 # Ends a step that cannot run here.
 skip() {
-    echo "$*" >"$WORK/reason"
+    echo "$*" >"$WORK/reason-${STEP:-none}"
     exit $SKIPPED
 }
 
 # Runs one step and records how it ended.
 run() {
-    local step=$1 start=$SECONDS status outcome reason=""
+    local step=$1 start=$SECONDS status outcome reason="" STEP=$1
     mkdir -p "$RESULTS"
-    rm -f "$WORK/reason"
+    rm -f "$WORK/reason-$step"
     echo "==> $step: $(describe "$step")"
     set +e
     (
@@ -352,7 +355,7 @@ run() {
     set -e
     case $status in
     0) outcome=passed ;;
-    "$SKIPPED") outcome=skipped reason=": $(cat "$WORK/reason")" ;;
+    "$SKIPPED") outcome=skipped reason=": $(cat "$WORK/reason-$step")" ;;
     *) outcome=failed reason=": status $status" ;;
     esac
     printf '%s %s (%d s)%s\n' "$step" "$outcome" $((SECONDS - start)) "$reason" |
@@ -390,7 +393,7 @@ describe() {
 help() {
     cat <<END
 ./ci.sh          ${PLAIN[*]}: no root, nothing installed
-./ci.sh full     ${FULL[*]}: what the plain run leaves out; as root, installs packages
+./ci.sh full     ${FULL[*]}, beside them ${BESIDE[*]}: what the plain run leaves out; as root, installs packages
 ./ci.sh tools    builds the tools of the full run, whose steps otherwise do it
 ./ci.sh summary  how every step on record ended
 ./ci.sh STEP...  these steps:
@@ -407,14 +410,19 @@ main() {
         run_all "${PLAIN[@]}"
         echo "==> left to ./ci.sh full, which installs what they need"
         local step
-        for step in "${FULL[@]}"; do
+        for step in "${FULL[@]}" "${BESIDE[@]}"; do
             echo "$step: $(describe "$step")"
         done
         summary "${PLAIN[@]}"
         ;;
     full)
+        mkdir -p "$WORK"
+        run_all "${BESIDE[@]}" >"$WORK/beside.log" 2>&1 &
+        local beside=$!
         run_all "${FULL[@]}"
-        summary "${FULL[@]}"
+        wait $beside || true
+        cat "$WORK/beside.log"
+        summary "${FULL[@]}" "${BESIDE[@]}"
         ;;
     tools)
         # Built before the steps that need them, which otherwise build them themselves.
