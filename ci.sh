@@ -70,7 +70,7 @@ step_page() {
 step_browser() {
     needs_command chromium chromium
     virtual_environment browser crates/supple-view/page/requirements.txt
-    cargo build --locked --workspace --exclude supple-python --bins
+    build_programs
     CHROMIUM=$(command -v chromium) "$WORK/browser/bin/python" crates/supple-view/page/check_page.py \
         target/debug/supple $WORK/browser-screenshots
 }
@@ -100,7 +100,7 @@ step_package() {
     "$bin/pip" install --quiet ./python
     # The tests of a system in real time fail on a busy machine: they run when asked for.
     if [[ ${SUPPLE_LIVE:-} == 1 ]]; then
-        cargo build --locked --workspace --exclude supple-python --bins
+        build_programs
         export SUPPLE_PROGRAMS=$PWD/target/debug
     fi
     (
@@ -122,7 +122,7 @@ step_site() {
     local python=$PWD/$WORK/package/bin/python programs=target/debug made=target/site
     "$python" -c "import supple" 2>/dev/null || skip "./ci.sh package has not installed the Python package"
     virtual_environment package docs/site/requirements.txt
-    cargo build --locked --workspace --exclude supple-python --bins
+    build_programs
     rm -rf $made
     "$python" docs/site/check_inline.py --programs $programs
     "$python" docs/site/notebooks.py --programs $programs --out $made/notebooks >$WORK/notebooks.log 2>&1 &
@@ -142,6 +142,12 @@ step_site() {
     echo "the site is in $made/html"
 }
 
+# Builds the programs in target/debug as `test` does: with other targets cargo would select other features of dependencies and
+# compile most of them again.
+build_programs() {
+    cargo test --locked --workspace --exclude supple-python --lib --bins --tests --no-run
+}
+
 # Makes a virtual environment of this name with these requirements.
 virtual_environment() {
     needs_command python3 python3
@@ -159,8 +165,7 @@ virtual_environment() {
 # urdfs: ten public URDFs, unedited, through `supple new`, the demo and `up --plant sim`; installs packages that carry them
 step_urdfs() {
     virtual_environment urdfs tests/any_arm/requirements.txt
-    # The programs that `test` builds.
-    cargo build --locked --workspace --exclude supple-python --bins
+    build_programs
     "$WORK/urdfs/bin/python" tests/any_arm/run.py --programs target/debug --steps new,demo,up
 }
 
