@@ -28,7 +28,7 @@ fn bench<const N: usize, T>(
         b.iter(|| {
             let mut state = turn.next().copied();
             if let Some(state) = &mut state {
-                // Too small to change the angle, but the compiler cannot infer that.
+                // The summand is too small to change the angle, but the compiler cannot infer this.
                 state.q[0] += before * 1e-200;
                 let result = function(state);
                 before = first(&result);
@@ -102,7 +102,7 @@ fn functions<const N: usize>(criterion: &mut Criterion, asset: &str) {
     );
 }
 
-/// Both forms of the law: as one sum, and with every term apart as in the controller.
+/// Measures both forms of the law: one sum, and separate terms as in the controller.
 fn position_law<const N: usize>(criterion: &mut Criterion, asset: &str) {
     let law = LawBench::<N, _>::new(config::<N>(asset).arm, gains());
     let states = regular_pool(&law.arm, &law.roles);
@@ -117,7 +117,7 @@ fn position_law<const N: usize>(criterion: &mut Criterion, asset: &str) {
         criterion,
         "law_apart",
         &states,
-        |s| law.apart(s),
+        |s| law.terms(s),
         |tau| tau.map_or(0.0, |tau| tau.stiffness[0]),
     );
 }
@@ -136,12 +136,12 @@ fn pose_law<const N: usize>(criterion: &mut Criterion, asset: &str) {
         criterion,
         "law_apart",
         &states,
-        |s| law.apart(s),
+        |s| law.terms(s),
         |tau| tau.map_or(0.0, |tau| tau.stiffness[0]),
     );
 }
 
-/// The complete cycle while the law holds the tip and the arm moves within 0.1 mrad.
+/// Measures the complete cycle while the law holds the tip and the arm moves within 0.1 mrad.
 fn step<const N: usize>(criterion: &mut Criterion, asset: &str) {
     let mut rig = Rig::<N>::tracking(asset);
     criterion.bench_function(&format!("step/{N}"), |b| b.iter(|| rig.step()));

@@ -1,6 +1,6 @@
 //! Speed of the experiments: a single probing run on one core relative to real time (target: factor 20), and
-//! the complete demo with logs on all cores (limit: 90 s on two). Prints minimum, median and maximum over
-//! several rounds.
+//! the complete demo with logs on all cores (limit: 90 s on two cores). Prints minimum, median and maximum over
+//! several repetitions.
 
 use std::time::Instant;
 use supple_core::Trajectory;

@@ -5,7 +5,7 @@ use std::hint::black_box;
 use std::time::Instant;
 use supple_core::dynamics::rnea;
 use supple_core::{Friction, Vector};
-use supple_ident::consistent::{Constraints, solve};
+use supple_ident::constrained_least_squares::{Constraints, solve};
 use supple_ident::qr_reduction::ReducedSystem;
 use supple_ident::regressor::joint_rows;
 use supple_ident::{Columns, DMatrix, FrictionColumns, Motion, model};
@@ -52,7 +52,7 @@ fn main() {
         cutoff_hz: None,
         start_s: 0.0,
         torque_delay_s: 0.0,
-        masks: Vec::new(),
+        excluded_intervals: Vec::new(),
     };
     let columns =
         Columns::new(7, &JOINTS, true, FrictionColumns::COULOMB_AND_OFFSET, &[]).expect("columns");

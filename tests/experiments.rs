@@ -8,7 +8,8 @@ use supple_core::trajectory::Sinusoid;
 use supple_experiment::metrics::{LineFit, median, spread};
 use supple_experiment::probing::{Stroke, effective_mass_kg, median_stroke, strokes};
 use supple_experiment::{
-    EdgeMeter, ExperimentError, Mismatch, Plan, Run, Setup, Variant, run, scenario, track_pose,
+    ExperimentError, Mismatch, Plan, Run, SegmentErrorAccumulator, Setup, Variant, run, scenario,
+    track_pose,
 };
 use supple_model::Description;
 use supple_plant::Scene;
@@ -228,19 +229,19 @@ fn the_error_after_a_corner_decays_along_the_edge() {
     let setup = wam4();
     let (quadrant, duration_s) = scenario::quadrant(scenario::QUADRANT_SPEED_M_PER_S);
     let trajectory = Trajectory::Quadrant(quadrant);
-    let mut meter = EdgeMeter::new(quadrant);
+    let mut accumulator = SegmentErrorAccumulator::new(quadrant);
     run(
         &plan(&setup, &Variant::EXACT, trajectory, duration_s),
         &mut |cycle, time_s| {
             if let (Some(time_s), Some(reference)) = (time_s, cycle.output.reference) {
                 let error = reference.position - cycle.truth.tip_position_m;
-                meter.cycle(time_s, error.norm());
+                accumulator.add_cycle(time_s, error.norm());
             }
             Ok(())
         },
     )
     .expect("the quadrant runs");
-    let edges = meter.finish();
+    let edges = accumulator.finish();
     assert_eq!(edges.len(), 6);
     for edge in edges.iter().filter(|edge| !edge.from_rest) {
         assert!(

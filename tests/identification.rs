@@ -11,7 +11,7 @@ use supple_experiment::procedure::{
     InProcessArm, LOGS, Operator, ProcedureOptions, Sweep, calibrate_arm,
 };
 use supple_experiment::{
-    Calibrated, Calibration, IdentifiedModelTracking, Mismatch, Plan, RequestSequence, Step,
+    Calibration, CalibrationResult, IdentifiedModelTracking, Mismatch, Plan, RequestSequence, Step,
     Wiring, breakaway, calibrate, identify_ripple, predict_tracking_error, run, scenario,
     track_with_identified_model,
 };
@@ -25,12 +25,12 @@ fn wam4() -> Description {
     Description::asset("wam4").expect("a built-in arm")
 }
 
-fn found(calibration: &Calibration) -> Calibrated<4> {
+fn found(calibration: &Calibration) -> CalibrationResult<4> {
     calibrate::<4>(&wam4(), calibration, &mut |_| {}).expect("it is calibrated")
 }
 
 /// Tracks the sinusoid with the identified model on the plant that it was identified on.
-fn sinusoid(found: &Calibrated<4>, calibration: &Calibration) -> IdentifiedModelTracking {
+fn sinusoid(found: &CalibrationResult<4>, calibration: &Calibration) -> IdentifiedModelTracking {
     let plant = plant_of::<4>(&wam4(), calibration).expect("four joints");
     track_with_identified_model(&found.description, &plant)
         .expect("the sinusoid runs")
@@ -361,14 +361,14 @@ fn refusal(wiring: Wiring<4>) -> String {
 fn wrong_wiring_is_named() {
     let swapped = refusal(Wiring {
         encoder_of: Some([2, 1, 0, 3]),
-        ..Wiring::RIGHT
+        ..Wiring::AS_DESCRIBED
     });
     for part in ["joint 0 (joint1)", "joint 2 (joint3)", "swapped", "TOML"] {
         assert!(swapped.contains(part), "{part}: {swapped}");
     }
     let reversed = refusal(Wiring {
         torque_factor: Some([-1.0, 1.0, 1.0, 1.0]),
-        ..Wiring::RIGHT
+        ..Wiring::AS_DESCRIBED
     });
     for part in ["joint 0 (joint1)", "check the signs of encoder and motor"] {
         assert!(reversed.contains(part), "{part}: {reversed}");

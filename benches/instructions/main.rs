@@ -103,11 +103,11 @@ fn pose_sum<const N: usize>(asset: &str) -> Call {
 }
 
 fn position_apart<const N: usize>(asset: &str) -> Call {
-    law_call(asset, gains(), regular::<N>, |law, s| law.apart(s))
+    law_call(asset, gains(), regular::<N>, |law, s| law.terms(s))
 }
 
 fn pose_apart<const N: usize>(asset: &str) -> Call {
-    law_call(asset, pose_gains(), any::<N>, |law, s| law.apart(s))
+    law_call(asset, pose_gains(), any::<N>, |law, s| law.terms(s))
 }
 
 fn controller_step<const N: usize>(asset: &str) -> Call {
@@ -159,18 +159,19 @@ fn limit(instructions: u64) -> LibraryBenchmarkConfig {
 #[bench::terms_4(args = (terms::<4>("wam4")), config = limit(3_950))]
 #[bench::terms_7(args = (terms::<7>("wam7")), config = limit(9_950))]
 #[bench::law_3_regular(args = (regular_sum::<3>("wam3")), config = limit(2_750))]
-// Near a singular pose, where the law for three joints takes the longer code path.
+// Near a singular pose the law for three joints takes the longer code path.
 #[bench::law_3(args = (position_sum::<3>("wam3")), config = limit(5_950))]
 #[bench::law_4(args = (position_sum::<4>("wam4")), config = limit(4_900))]
 #[bench::law_7(args = (pose_sum::<7>("wam7")), config = limit(15_400))]
 #[bench::law_apart_3(args = (position_apart::<3>("wam3")), config = limit(4_850))]
 #[bench::law_apart_4(args = (position_apart::<4>("wam4")), config = limit(5_550))]
 #[bench::law_apart_7(args = (pose_apart::<7>("wam7")), config = limit(17_500))]
-// Before the checks of plausibility, collision and stopping came: 6,246, 6,926 and 15,215. The limits are a tenth above.
+// Without the checks of plausibility, collision and stopping the counts were 6,246, 6,926 and 15,215. The limits are a tenth
+// above.
 #[bench::step_3(args = (controller_step::<3>("wam3")), config = limit(6_870))]
 #[bench::step_4(args = (controller_step::<4>("wam4")), config = limit(7_618))]
 #[bench::step_7(args = (controller_step::<7>("wam7")), config = limit(16_736))]
-// With learned terms of every kind: at most a tenth more than without.
+// The counts with learned terms of every kind are at most a tenth above those without learned terms.
 #[bench::step_3_learned(args = (learned_step::<3>("wam3")), config = limit(7_700))]
 #[bench::step_4_learned(args = (learned_step::<4>("wam4")), config = limit(8_600))]
 #[bench::step_7_learned(args = (learned_step::<7>("wam7")), config = limit(18_300))]

@@ -90,7 +90,7 @@ fn position_law<const N: usize>(
     let states = &mut case.states;
     let mut bench = Bench { states, out };
     bench.run("law", |s| law.sum(s).unwrap_or(Vector::zeros()))?;
-    bench.run("law_apart", |s| law.apart(s).unwrap_or(Torques::zeros()))?;
+    bench.run("law_apart", |s| law.terms(s).unwrap_or(Torques::zeros()))?;
     step(asset, bench)
 }
 
@@ -110,7 +110,7 @@ fn pose_law<const N: usize>(
     let states = &mut case.states;
     let mut bench = Bench { states, out };
     bench.run("law", |s| law.sum(s).unwrap_or(Vector::zeros()))?;
-    bench.run("law_apart", |s| law.apart(s).unwrap_or(Torques::zeros()))?;
+    bench.run("law_apart", |s| law.terms(s).unwrap_or(Torques::zeros()))?;
     step(asset, bench)
 }
 

@@ -1,4 +1,4 @@
-//! Shared by the benchmarks: an arm in a given state, and a pool of random states.
+//! Code that the benchmarks share: an arm in a given state, and a pool of random states.
 //!
 //! `dynamics.rs` measures wall-clock time, `instructions` counts instructions, and `peers` compares with other
 //! libraries.
@@ -24,13 +24,13 @@ pub const STATES: usize = 256;
 /// One state of an arm and the references of the law in it.
 #[derive(Clone, Copy, Debug)]
 pub struct State<const N: usize> {
-    /// \[rad\]
+    /// Joint angles \[rad\].
     pub q: Vector<N>,
-    /// \[rad/s\]
+    /// Joint velocities \[rad/s\].
     pub qd: Vector<N>,
-    /// \[rad/s^2\]
+    /// Joint accelerations \[rad/s^2\].
     pub qdd: Vector<N>,
-    /// \[N m\]
+    /// Joint torques \[N m\].
     pub tau: Vector<N>,
     /// Reference of the position law.
     pub position: Reference,
@@ -55,7 +55,7 @@ pub fn pose_gains() -> PoseGains {
 /// Damping of the null space in all benchmarks \[N m s/rad\].
 pub const NULLSPACE_DAMPING: f64 = 2.0;
 
-/// The law of an arm in both its forms.
+/// The law of an arm in both forms.
 #[derive(Clone, Copy, Debug)]
 pub struct LawBench<const N: usize, G> {
     /// The arm.
@@ -69,7 +69,7 @@ pub struct LawBench<const N: usize, G> {
 }
 
 impl<const N: usize, G> LawBench<N, G> {
-    /// All joints active.
+    /// Creates the law with all joints active.
     pub fn new(arm: Arm<N>, gains: G) -> Self {
         LawBench {
             arm,
@@ -94,15 +94,15 @@ impl<const N: usize> LawBench<N, Gains> {
         }
     }
 
-    /// As one sum; `None` if the arm is not physical.
+    /// Returns the torque as one sum; `None` if the arm is not physical.
     #[inline]
     pub fn sum(&self, s: &State<N>) -> Option<Vector<N>> {
         impedance_torque(&self.arm, &self.roles, &s.q, &self.input(s))
     }
 
-    /// Every term apart; `None` if the arm is not physical.
+    /// Returns the separate torque terms; `None` if the arm is not physical.
     #[inline]
-    pub fn apart(&self, s: &State<N>) -> Option<Torques<N>> {
+    pub fn terms(&self, s: &State<N>) -> Option<Torques<N>> {
         let mut filled = Terms::default();
         terms(&self.arm, &s.q, &s.qd, &mut filled);
         let task = Task::new(&filled, &self.roles)?;
@@ -123,15 +123,15 @@ impl<const N: usize> LawBench<N, PoseGains> {
         }
     }
 
-    /// As one sum; `None` if the arm is not physical.
+    /// Returns the torque as one sum; `None` if the arm is not physical.
     #[inline]
     pub fn sum(&self, s: &State<N>) -> Option<Vector<N>> {
         impedance_torque(&self.arm, &self.roles, &s.q, &self.input(s))
     }
 
-    /// Every term apart; `None` if the arm is not physical.
+    /// Returns the separate torque terms; `None` if the arm is not physical.
     #[inline]
-    pub fn apart(&self, s: &State<N>) -> Option<Torques<N>> {
+    pub fn terms(&self, s: &State<N>) -> Option<Torques<N>> {
         let mut filled = Terms::default();
         terms(&self.arm, &s.q, &s.qd, &mut filled);
         let task = Task::of_pose(&filled, &self.roles)?;
@@ -139,7 +139,7 @@ impl<const N: usize> LawBench<N, PoseGains> {
     }
 }
 
-/// The configuration of a built-in arm.
+/// Returns the configuration of a built-in arm.
 ///
 /// # Panics
 /// If the asset does not have `N` joints.
@@ -148,14 +148,14 @@ pub fn config<const N: usize>(name: &str) -> Config<N> {
     description.config::<N>().expect("N joints")
 }
 
-/// A pool of states of `arm`, the same in every run.
+/// Returns a pool of states of `arm`, the same in every run.
 pub fn pool<const N: usize>(arm: &Arm<N>) -> Vec<State<N>> {
     let mut random = Random::new(20_261_121);
     (0..STATES).map(|_| random.state(arm)).collect()
 }
 
-/// As [`pool`], without poses near singular ones of the active joints, where the law takes a different code
-/// path.
+/// Returns the states of [`pool`] without those near singular poses of the active joints, in which the law takes a different
+/// code path.
 pub fn regular_pool<const N: usize>(arm: &Arm<N>, roles: &[Role; N]) -> Vec<State<N>> {
     let mut random = Random::new(20_261_122);
     let regular = |state: &State<N>| {
@@ -191,7 +191,7 @@ impl<const N: usize> Rig<N> {
         Rig::of_config(config(asset))
     }
 
-    /// As [`Rig::tracking`], with learned terms of every kind in force.
+    /// Creates the rig of [`Rig::tracking`] with learned terms of every kind.
     pub fn learned(asset: &str) -> Self {
         let mut config = config::<N>(asset);
         let limits = &config.limits;
@@ -206,7 +206,7 @@ impl<const N: usize> Rig<N> {
         Rig::of_config(config)
     }
 
-    /// As [`Rig::tracking`], with limits that nothing reaches: the arm may be measured anywhere, at any speed.
+    /// Creates the rig of [`Rig::tracking`] without effective limits, so that any measured pose and speed is permitted.
     pub fn anywhere(asset: &str) -> Self {
         let mut config = config::<N>(asset);
         let limits = &mut config.limits;
@@ -290,7 +290,7 @@ impl<const N: usize> Rig<N> {
     }
 }
 
-/// A limit that nothing reaches, in any unit.
+/// A limit without effect, in any unit.
 const FAR: f64 = 1e9;
 
 /// Draws of states.

@@ -6,7 +6,7 @@ use crate::errors;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use supple_core::Vector;
-use supple_ident::base::RANK_TOLERANCE;
+use supple_ident::base_parameters::RANK_TOLERANCE;
 use supple_ident::regressor::rows;
 use supple_ident::{BaseParameters, Columns, DMatrix, DVector, FrictionColumns, IdentError, model};
 use supple_model::{ModelError, with_dof};
@@ -77,7 +77,7 @@ fn sized<const N: usize>(
             .copy_from(&block);
     }
     // The triangular factor has the same column norms and angles and is small.
-    let base = BaseParameters::of(&stacked.qr().r(), RANK_TOLERANCE)?;
+    let base = BaseParameters::from_regressor(&stacked.qr().r(), RANK_TOLERANCE)?;
     let values = model::prior(arm, &columns);
     Ok((base, columns, values))
 }

@@ -12,8 +12,10 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::PathBuf;
 use supple_experiment::calibrate::{Calibration, log_of, plant_of};
 use supple_experiment::{ExperimentError, excitation};
-use supple_ident::design::{self, Criterion, DesignOptions, ExcitationDesign, Workspace};
-use supple_ident::{IdentError, Log, SeriesLists};
+use supple_ident::excitation_design::{
+    self, Criterion, DesignOptions, ExcitationDesign, Workspace,
+};
+use supple_ident::{FourierCoefficients, IdentError, Log};
 use supple_model::{Description, ModelError, with_dof};
 
 /// Options of the design; the package checks names and fills in defaults.
@@ -42,9 +44,9 @@ pub struct Series {
     ramp_s: f64,
 }
 
-impl From<Series> for SeriesLists {
-    fn from(series: Series) -> SeriesLists {
-        SeriesLists {
+impl From<Series> for FourierCoefficients {
+    fn from(series: Series) -> FourierCoefficients {
+        FourierCoefficients {
             centre_rad: series.centre_rad,
             sine_rad: series.sine_rad,
             cosine_rad: series.cosine_rad,
@@ -120,7 +122,7 @@ enum Refused {
 
 struct Found {
     table: Table,
-    series: SeriesLists,
+    series: FourierCoefficients,
     rank: usize,
     condition: f64,
     history: Vec<f64>,
@@ -134,7 +136,7 @@ fn searched<const N: usize>(
     let config = description.config::<N>().map_err(Refused::Model)?;
     let home = description.home::<N>().map_err(Refused::Model)?;
     let wanted = DesignOptions {
-        moving: request.moving.clone(),
+        excited_joints: request.moving.clone(),
         period_s: request.period_s,
         periods: request.periods,
         criterion: if request.d_optimality {
@@ -148,8 +150,8 @@ fn searched<const N: usize>(
         candidates: request.candidates,
         seed: request.seed,
     };
-    let designed =
-        design::design(&config, &home, &wanted, report_progress).map_err(Refused::Design)?;
+    let designed = excitation_design::design(&config, &home, &wanted, report_progress)
+        .map_err(Refused::Design)?;
     Ok(series_for_python(&designed, request.rate_hz))
 }
 
@@ -167,7 +169,7 @@ fn series_for_python<const N: usize>(designed: &ExcitationDesign<N>, rate_hz: f6
     }
     Found {
         table,
-        series: SeriesLists::from(series),
+        series: FourierCoefficients::from(series),
         rank: designed.rank,
         condition: designed.condition,
         history: designed.history.clone(),
@@ -200,7 +202,7 @@ pub fn excite<'py>(
         model.for_controller(py)?.clone(),
     );
     let log_dir = options.log_dir.clone();
-    let series = SeriesLists::from(series);
+    let series = FourierCoefficients::from(series);
     let log = interruptible(py, move |_| {
         with_dof!(truth.dof(), N => followed::<N>(&truth, &known, &series, &options))
             .map_err(ExperimentError::from)
@@ -228,7 +230,7 @@ pub fn excite<'py>(
 fn followed<const N: usize>(
     truth: &Description,
     known: &Description,
-    series: &SeriesLists,
+    series: &FourierCoefficients,
     options: &ExciteOptions,
 ) -> Result<(Log, f64), ExperimentError> {
     let calibration = Calibration {

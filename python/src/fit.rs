@@ -115,12 +115,12 @@ impl<const N: usize> Model for supple_ident::Fit<N> {
     ) -> Result<Vec<Vec<Line>>, SaveError> {
         let preparation = Preparation {
             cutoff_hz: Some(cutoff_hz),
-            keep_every: 1,
+            decimation_factor: 1,
             ..self.preparation
         };
         let motions = logs
             .iter()
-            .map(|log| log.motion(self.columns.moving(), &preparation));
+            .map(|log| log.motion(self.columns.identified_joints(), &preparation));
         let motions = motions.collect::<Result<Vec<_>, _>>()?;
         let motions: Vec<_> = motions.into_iter().map(|(motion, _)| motion).collect();
         let motors = of.motors();
@@ -136,7 +136,9 @@ impl<const N: usize> Model for supple_ident::Fit<N> {
     }
 
     fn motion(&self, samples: &Samples) -> Result<Motion, IdentError> {
-        Ok(samples.motion(self.columns.moving(), &self.preparation)?.0)
+        Ok(samples
+            .motion(self.columns.identified_joints(), &self.preparation)?
+            .0)
     }
 
     fn predict(&self, states: &[States<'_>], out: &mut [f64]) {
@@ -174,7 +176,7 @@ impl<const N: usize> Model for supple_ident::Fit<N> {
             base_parameters: self.base_parameters().as_slice().to_vec(),
             std: self.base_std.as_slice().to_vec(),
             condition: self.base.condition,
-            moving: self.columns.moving().to_vec(),
+            moving: self.columns.identified_joints().to_vec(),
             noise_nm: self.noise_nm.clone(),
             training_relative: self.training_relative,
             gap: self.optimality_gap,
@@ -379,7 +381,7 @@ fn sized<const N: usize>(
     find_stribeck: bool,
 ) -> Result<Found, Refused> {
     let arm = of.arm::<N>()?;
-    let moving = procedure.moving_joints(N)?;
+    let moving = procedure.identified_joints(N)?;
     let (mut motions, mut warnings) = (Vec::new(), Vec::new());
     for log in logs {
         let (motion, result_warnings) = log.checked_motion(&arm, &moving, procedure)?;

@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use supple_core::config::{FrictionVelocity, Gains, Role};
 use supple_core::dynamics::{self, Terms};
-use supple_core::impedance::{Apparent, LawInput, PositionTarget, Target, Task, impedance};
+use supple_core::impedance::{ChosenInertia, LawInput, PositionTarget, Target, Task, impedance};
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::target::{PoseGains, PoseReference, PoseTarget};
 use supple_core::torques::TERMS;
@@ -452,7 +452,7 @@ fn each_state<T: TipTask<D>, const N: usize, const D: usize>(
         let apparent = match &batch.apparent {
             Some((inertia, force)) => {
                 let inertia = Matrix::<D, D>::from_row_slice(inertia.at(k));
-                let found = Apparent::new(&inertia, force.vector(k));
+                let found = ChosenInertia::new(&inertia, force.vector(k));
                 let found = found.filter(|_| inertia == inertia.transpose());
                 Some(found.ok_or(rejected(Reason::ApparentInertia))?)
             }

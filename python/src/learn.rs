@@ -65,7 +65,7 @@ fn sized<const N: usize>(
     let preparation = Preparation {
         rate_hz: None,
         cutoff_hz: Some(options.cutoff_hz),
-        keep_every: options.keep_every,
+        decimation_factor: options.keep_every,
         torque_delay_s: options.torque_delay_s,
     };
     let motions = samples

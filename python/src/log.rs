@@ -8,7 +8,7 @@ use pyo3::types::PyDict;
 use std::path::{Path, PathBuf};
 use supple_core::controller::CycleRecord;
 use supple_core::record::{Cell, for_each_column};
-use supple_log::{CycleTiming, LogError, PlantTruth, Reader, Timed};
+use supple_log::{CycleTiming, LogError, PlantTruth, Reader, TimedMessage};
 use supple_model::with_dof;
 
 /// What a log holds, before it has a form in Python.
@@ -24,14 +24,14 @@ struct Columns {
 #[pyfunction]
 pub fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
     let (reader, columns) = py.detach(|| read(&path)).map_err(errors::log)?;
-    let about = reader.about();
+    let metadata = reader.metadata();
     let dict = PyDict::new(py);
     let description = reader.description().map_err(errors::log)?;
     dict.set_item("arm", Arm::new(description).map_err(errors::model)?)?;
-    dict.set_item("experiment", &about.experiment)?;
-    dict.set_item("software", &about.software)?;
-    dict.set_item("seed", about.seed)?;
-    dict.set_item("notes", &about.notes)?;
+    dict.set_item("experiment", &metadata.experiment)?;
+    dict.set_item("software", &metadata.software)?;
+    dict.set_item("seed", metadata.seed)?;
+    dict.set_item("notes", &metadata.notes)?;
     dict.set_item("modes", columns.modes)?;
     dict.set_item("faults", columns.faults)?;
     dict.set_item("steps", columns.steps.into_dict(py)?)?;
@@ -42,13 +42,13 @@ pub fn read_log(py: Python<'_>, path: PathBuf) -> PyResult<Bound<'_, PyDict>> {
 
 fn read(path: &Path) -> Result<(Reader, Columns), LogError> {
     let reader = Reader::open(path)?;
-    let joints = reader.about().joints.len();
+    let joints = reader.metadata().joints.len();
     let columns = with_dof!(joints, N => sized::<N>(&reader))??;
     Ok((reader, columns))
 }
 
 fn sized<const N: usize>(reader: &Reader) -> Result<Columns, LogError> {
-    let start_ns = reader.about().start_ns;
+    let start_ns = reader.metadata().start_ns;
     let seconds = |time_ns: u64| time_ns.saturating_sub(start_ns) as f64 * 1e-9;
     let mut columns = Columns {
         steps: Table::default(),
@@ -59,7 +59,7 @@ fn sized<const N: usize>(reader: &Reader) -> Result<Columns, LogError> {
     };
     let mut fault = 0;
     for record in reader.records::<N>()? {
-        let Timed { time_ns, value } = record?;
+        let TimedMessage { time_ns, value } = record?;
         step(&mut columns.steps, seconds(time_ns), &value);
         columns
             .modes
@@ -73,12 +73,12 @@ fn sized<const N: usize>(reader: &Reader) -> Result<Columns, LogError> {
             }
         }
     }
-    for message in reader.truths::<N>()? {
-        let Timed { time_ns, value } = message?;
+    for message in reader.plant_truths::<N>()? {
+        let TimedMessage { time_ns, value } = message?;
         truth(&mut columns.truth, seconds(time_ns), &value);
     }
     for message in reader.timings()? {
-        let Timed { time_ns, value } = message?;
+        let TimedMessage { time_ns, value } = message?;
         timing(&mut columns.timing, seconds(time_ns), &value);
     }
     Ok(columns)

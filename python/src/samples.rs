@@ -84,11 +84,11 @@ impl Samples {
         check_finite("qdd", qdd)?;
         let as_given = preparation.cutoff_hz.is_none()
             && preparation.rate_hz.is_none()
-            && preparation.keep_every == 1
+            && preparation.decimation_factor == 1
             && preparation.torque_delay_s == 0.0;
         if !as_given {
             let (motion, warnings) = Motion::prepare(&self.log, dof, moving, preparation)?;
-            let rate_hz = motion.rate_hz * preparation.keep_every as f64;
+            let rate_hz = motion.rate_hz * preparation.decimation_factor as f64;
             let mut grid = resample(&self.log.t_s, qdd, rate_hz, 0.0);
             if let Some(cutoff_hz) = preparation.cutoff_hz {
                 grid = LowPass::butterworth4(cutoff_hz, rate_hz)?.zero_phase_columns(&grid)?;
@@ -115,7 +115,7 @@ impl Samples {
             cutoff_hz: None,
             start_s: t[0],
             torque_delay_s: 0.0,
-            masks: Vec::new(),
+            excluded_intervals: Vec::new(),
         };
         Ok((motion, warnings))
     }

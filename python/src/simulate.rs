@@ -10,7 +10,7 @@ use pyo3::types::PyDict;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use supple_core::Trajectory;
-use supple_experiment::probing::{ContactMeter, Stroke};
+use supple_experiment::probing::{ContactAccumulator, Stroke};
 use supple_experiment::{
     Cycle, ExperimentError, Mismatch, Plan, Recorder, Run, Setup, Variant, run, scenario,
 };
@@ -104,7 +104,7 @@ fn sized<const N: usize>(
         None => None,
     };
     let mut meter = match plan.trajectory {
-        Trajectory::Probe(probe) => Some(ContactMeter::new(probe)),
+        Trajectory::Probe(probe) => Some(ContactAccumulator::new(probe)),
         _ => None,
     };
     let mut cycles = Table::default();
@@ -118,7 +118,7 @@ fn sized<const N: usize>(
         if let Some(time_s) = time_s {
             row(&mut cycles, time_s, cycle);
             if let Some(meter) = &mut meter {
-                meter.cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
+                meter.add_cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
             }
         }
         Ok(())
@@ -129,7 +129,7 @@ fn sized<const N: usize>(
     Ok(Outcome {
         run,
         cycles,
-        strokes: meter.map_or_else(Vec::new, ContactMeter::finish),
+        strokes: meter.map_or_else(Vec::new, ContactAccumulator::finish),
     })
 }
 

@@ -9,15 +9,15 @@ pub use crate::model::ripple::RippleTable;
 pub use crate::model::workspace::{Border, Workspace, Zone};
 use crate::record::Text;
 
-/// Names of the joints in messages, as in the URDF; an empty one stands for the joint's index.
+/// Names of the joints in messages, as in the URDF; a joint with an empty name is written by its index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct JointNames<const N: usize>([Text; N]);
 
 impl<const N: usize> JointNames<N> {
-    /// No names: messages have the index of each joint, from 0.
+    /// No names: messages contain the index of each joint, from 0.
     pub const NONE: JointNames<N> = JointNames([Text::EMPTY; N]);
 
-    /// The names of `names`, in order; joints beyond them have none.
+    /// Takes the names in order; further joints have no name.
     pub fn new<S: AsRef<str>>(names: &[S]) -> JointNames<N> {
         JointNames(core::array::from_fn(|i| {
             names
@@ -86,7 +86,7 @@ impl RotationalGains {
     }
 }
 
-/// Parameters of the pose mode, beside those of the [`Law`].
+/// Parameters of the track pose mode, in addition to those of the [`Law`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PoseLaw<const N: usize> {
     /// Initial gains of the orientation; requests can change them, by ramps.
@@ -99,7 +99,7 @@ pub struct PoseLaw<const N: usize> {
     pub angular_speed_rad_per_s: f64,
     /// Angle between the tip and its reference that faults \[rad\], positive.
     pub rotation_error_rad: f64,
-    /// Stiffness in the null space towards the joints' angles at the entry \[N m/rad\], zero or more.
+    /// Null-space stiffness towards the joint angles at which the mode was entered \[N m/rad\], zero or more.
     pub posture_stiffness_nm_per_rad: Vector<N>,
     /// Maximum torque of that stiffness, before its projection \[N m\], zero or more.
     pub posture_torque_nm: Vector<N>,
@@ -196,11 +196,11 @@ pub struct ContactLatch {
     pub fade_s: f64,
     /// Time for restoring the full feed-forward after release \[s\], positive.
     pub restore_s: f64,
-    /// Time from contact to the beginning of the fade \[s\], zero or more: with all of the feed-forward the tip settles
-    /// on what it met, instead of hovering where the joints' friction holds it after a bounce.
+    /// Time from contact to the beginning of the fade \[s\], zero or more. With the full feed-forward the tip settles
+    /// on the obstacle; without it, the joints' friction could hold the tip off the obstacle after a bounce.
     pub settle_s: f64,
-    /// Keeps the friction feed-forward of the moment of contact until release, instead of following a reference
-    /// that the blocked arm does not follow. Logs from before it existed have `false`.
+    /// Freezes the friction feed-forward from contact to release, because the blocked arm does not follow its reference.
+    /// Configurations of logs that lack this field have `false`.
     pub hold_friction: bool,
     /// Rate of false alarms in free motion for which the residuals of the model in use set the threshold \[1/h\],
     /// positive; infinite: the threshold stays as configured.
@@ -345,7 +345,7 @@ pub struct Config<const N: usize> {
     pub joint_from_motor: Matrix<N, N>,
     /// Torque ripple of each motor, compensated by feed-forward.
     pub ripple: [RippleTable; N],
-    /// What was learned of the model before: the terms in force at the start. Within
+    /// Learned terms of the model in force at the start, within
     /// [`LearnedBounds`](crate::learned::LearnedBounds).
     pub learned: LearnedTerms<N>,
     /// Compliance between the encoder of each joint and its link, zero or more \[rad/(N m)\]: under the model's gravity
@@ -363,15 +363,15 @@ pub struct Config<const N: usize> {
     pub move_gains: JointGains<N>,
     /// Initial gains of the joint impedance mode; requests can change them, by ramps.
     pub joint_gains: JointGains<N>,
-    /// The pose mode.
+    /// Parameters of the track pose mode.
     pub pose: PoseLaw<N>,
     /// Share of the friction torque at the measured joint velocity that the float mode compensates, 0 to 1. The
     /// rest, `1 - share`, damps the arm.
     pub float_friction_share: f64,
     /// Joint damping of gravity hold \[N m s/rad\], zero or more.
     pub hold_damping_nm_s_per_rad: Vector<N>,
-    /// Gravity hold keeps every joint by a position loop with the move mode's gains and collision thresholds: for a model
-    /// that would let the arm sink. A fault opens these loops as all others.
+    /// Whether gravity hold keeps every joint with a position loop, with the move mode's gains and collision thresholds, for a
+    /// model with which the arm would sink. A fault opens these loops like all others.
     pub hold_pose: bool,
     /// Time over which the torque is blended after a change of mode \[s\], positive.
     pub handover_s: f64,

@@ -1,6 +1,6 @@
-//! Compiles the generic code here, once, for each number of joints that `supple_model::with_dof` accepts. Between crates at
-//! optimisation levels 0, 1, s and z rustc shares generic code; debug assertions stand for these levels (`dev`, `test`). At
-//! other levels each crate compiles what it uses, and this module is left out.
+//! Compiles the generic code once, in this crate, for each number of joints that `supple_model::with_dof` accepts. At
+//! optimisation levels 0, 1, s and z crates share compiled generic code; enabled debug assertions indicate these levels (`dev`,
+//! `test`). At other levels each crate compiles the generic code that it uses, and this module is left out.
 
 use crate::codes::RequestCode;
 use crate::controller::{Controller, CycleRecord, State, check_motion, limit, step};
@@ -11,7 +11,7 @@ use crate::dynamics::{
 };
 use core::hint::black_box;
 
-/// Never called. Naming the functions makes rustc compile them and all that they call.
+/// Is never called; rustc compiles the functions that it names, and all functions that these call.
 fn compile<const N: usize>() {
     black_box([
         step::<N> as *const (),

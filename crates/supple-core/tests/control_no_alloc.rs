@@ -107,7 +107,7 @@ fn of_7_joints() {
 
 /// Checks that the counter itself works: it also counts the release.
 #[test]
-fn an_allocation_is_counted() {
+fn the_counter_counts_an_allocation() {
     let count = count_allocations(|| drop(std::hint::black_box(Box::new(Mode::Idle))));
     assert_eq!(count, 2);
 }

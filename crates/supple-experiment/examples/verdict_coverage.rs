@@ -41,7 +41,7 @@ fn interval<const N: usize>(
         cutoff_hz: None,
         start_s: first[0],
         torque_delay_s: 0.0,
-        masks: Vec::new(),
+        excluded_intervals: Vec::new(),
     };
     let region = SinusoidRegion::<N>::new(description)?.ok_or("the sinusoid is out of reach")?;
     let moving: Vec<usize> = (0..N).collect();

@@ -1,7 +1,7 @@
-//! What the demo does with an experiment that an arm cannot perform: it is made smaller, or left out.
+//! If an arm cannot perform an experiment, the demo makes the experiment smaller, or leaves it out.
 //!
-//! This is for arms whose settings are derived from a URDF, with the plant and the model of that URDF: whether they can do all
-//! of the paper's experiments is not known. A fault of any other arm is a result that nobody may overlook.
+//! The demo does this for arms whose settings are derived from a URDF, with the plant and the model of that URDF, because such an
+//! arm may be unable to perform some of the paper's experiments. A fault of any other arm stays in the results.
 
 use crate::demo_options::DemoOptions;
 use crate::error::ExperimentError;
@@ -19,37 +19,37 @@ const SCALES: [f64; 3] = [1.0, 0.5, 0.25];
 pub struct Adapted {
     /// Name of the run, as in its log.
     pub run: String,
-    /// Size at which it ran, relative to the arm's paths; absent if it was left out.
+    /// Size at which the experiment ran, relative to the arm's paths; absent if the demo left it out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scale: Option<f64>,
-    /// Why it could not run at full size.
+    /// Reason why the experiment could not run at full size.
     pub reason: String,
 }
 
-/// What came of a run.
-pub(crate) struct Performed {
-    /// The result, of the size in `adapted`; of a run that was left out, without values.
+/// Result of a job, and how the job was adapted.
+pub(crate) struct JobOutcome {
+    /// Result at the size in `adapted`; has no values if the job was left out.
     pub result: JobResult,
-    /// Set if it did not run at full size.
+    /// Set if the job did not run at full size.
     pub adapted: Option<Adapted>,
 }
 
-/// Whether experiments that the arm cannot perform are made smaller or left out.
+/// Returns whether the demo adapts experiments that the arm cannot perform.
 pub(crate) fn may_adapt(description: &Description, options: &DemoOptions) -> bool {
     description.has_derived_settings() && options.model.is_none() && options.plant.is_none()
 }
 
-/// Performs a job, smaller if the arm cannot do it at full size and `may_adapt`.
+/// Performs a job. If the arm cannot do it at full size and [`may_adapt`] permits it, performs it at a smaller size.
 pub(crate) fn perform<const N: usize>(
     job: &Job,
     setup: &Setup<N>,
     description: &Description,
     options: &DemoOptions,
-) -> Result<Performed, ExperimentError> {
+) -> Result<JobOutcome, ExperimentError> {
     if !may_adapt(description, options) {
         let plan = job.plan(setup, options.seed)?;
         let result = job.run(&plan, description, options)?;
-        return Ok(Performed {
+        return Ok(JobOutcome {
             result,
             adapted: None,
         });
@@ -75,11 +75,11 @@ pub(crate) fn perform<const N: usize>(
                         scale: Some(scale),
                         reason,
                     });
-                    return Ok(Performed { result, adapted });
+                    return Ok(JobOutcome { result, adapted });
                 }
             },
-            Err(error) if is_of_the_arm(&error) => {
-                remove_part(job, options);
+            Err(error) if is_arm_limitation(&error) => {
+                remove_partial_log(job, options);
                 error.to_string()
             }
             Err(error) => return Err(error),
@@ -87,7 +87,7 @@ pub(crate) fn perform<const N: usize>(
         first_reason.get_or_insert(reason);
     }
     let plan = job.plan(setup, options.seed).ok();
-    Ok(Performed {
+    Ok(JobOutcome {
         result: JobResult::left_out(job, plan.as_ref()),
         adapted: Some(Adapted {
             run: job.name(),
@@ -98,15 +98,15 @@ pub(crate) fn perform<const N: usize>(
 }
 
 /// Removes the log of a run that did not begin.
-fn remove_part(job: &Job, options: &DemoOptions) {
+fn remove_partial_log(job: &Job, options: &DemoOptions) {
     if let Some(folder) = &options.log_dir {
-        // It is not there if the run was rejected before its log began.
+        // The file does not exist if the run was rejected before its log began.
         let _ = std::fs::remove_file(folder.join(format!("{}.mcap.part", job.name())));
     }
 }
 
-/// Whether the error means that the arm cannot perform the experiment, not that something else is wrong.
-fn is_of_the_arm(error: &ExperimentError) -> bool {
+/// Returns whether the error means that the arm cannot perform the experiment.
+fn is_arm_limitation(error: &ExperimentError) -> bool {
     matches!(
         error,
         ExperimentError::BeyondJointStop { .. }
@@ -117,7 +117,7 @@ fn is_of_the_arm(error: &ExperimentError) -> bool {
     )
 }
 
-/// Simulated time of a job for the display of progress \[s\].
+/// Returns the simulated time of a job, for the display of progress \[s\].
 pub(crate) fn expected_s<const N: usize>(job: &Job, setup: &Setup<N>, seed: u64) -> f64 {
     let plan = job.plan(setup, seed);
     plan.map_or(0.0, |plan: Plan<N>| plan.duration_s)

@@ -16,9 +16,9 @@ const ACCELERATION_SHARE: f64 = 0.95;
 /// Points at which the tip's speed is computed.
 const POINTS: u32 = 64;
 
-/// Duration of a minimum-jerk move on a straight line in joint space: at least one second, at most half of the joint speed
-/// limits, 85 % of the tip's, and within the limits of acceleration and jerk \[s\]. It is rounded up to 0.01 s, so that equal moves
-/// give equal logs.
+/// Returns the duration of a minimum-jerk move on a straight line in joint space \[s\]. The move takes at least one second, and
+/// reaches at most half of the joint speed limits, 85 % of the tip's speed limit, and the limits of acceleration and jerk. The
+/// duration is rounded up to 0.01 s, so that equal moves give equal logs.
 pub fn approach_s<const N: usize>(
     config: &Config<N>,
     from_rad: &Vector<N>,
@@ -28,8 +28,8 @@ pub fn approach_s<const N: usize>(
     (needed * 100.0).ceil() / 100.0
 }
 
-/// Shortest duration of a minimum-jerk move on a straight line in joint space: at most half of the joint speed limits, 85 % of
-/// the tip's, and within the limits of acceleration and jerk \[s\]; zero if the arm is there.
+/// Returns the shortest duration of a minimum-jerk move on a straight line in joint space that reaches at most half of the joint
+/// speed limits, 85 % of the tip's speed limit, and the limits of acceleration and jerk \[s\]; zero if the arm is at the target.
 pub(crate) fn within_limits_s<const N: usize>(
     config: &Config<N>,
     from_rad: &Vector<N>,

@@ -3,7 +3,7 @@
 //!
 //! The torque beyond the model's gravity at which a joint starts to slide is `S_0`. Half the sum of both directions is
 //! independent of errors of the gravity model; half the difference is that error. A ramp begins at the torque that held
-//! its joint, which is part of it.
+//! its joint, and its torque includes that holding torque.
 
 use crate::error::ExperimentError;
 use crate::excite::{move_to, without_held_joints};
@@ -31,17 +31,17 @@ const REST_S: f64 = 0.3;
 pub struct JointBreakaway {
     /// Torque beyond the model's gravity at which the joint started to slide in the positive direction \[N m\].
     pub positive_nm: f64,
-    /// The same in the negative direction, positive if the torque was negative \[N m\].
+    /// Torque in the negative direction, positive if the torque was negative \[N m\].
     pub negative_nm: f64,
 }
 
 impl JointBreakaway {
-    /// `S_0` \[N m\].
+    /// Returns `S_0` \[N m\].
     pub fn breakaway_nm(&self) -> f64 {
         0.5 * (self.positive_nm + self.negative_nm)
     }
 
-    /// Direction-independent torque: error of the gravity model, or a friction offset \[N m\].
+    /// Returns the direction-independent torque: error of the gravity model, or a friction offset \[N m\].
     pub fn offset_nm(&self) -> f64 {
         0.5 * (self.positive_nm - self.negative_nm)
     }
@@ -107,8 +107,8 @@ pub fn breakaway<const N: usize>(
     Ok(found)
 }
 
-/// Torque of a ramp beyond the gravity of `config` at which its joint began to slide \[N m\], positive along the ramp's
-/// direction, which is 1 or -1; `None` if it did not slide. The recording begins with the ramp.
+/// Returns the torque of a ramp beyond the gravity of `config` at which its joint began to slide \[N m\], positive along the
+/// ramp's direction, which is 1 or -1; `None` if the joint did not slide. The recording begins with the ramp.
 pub(crate) fn sliding_torque_nm<const N: usize>(
     config: &Config<N>,
     recording: &Recording,
@@ -126,7 +126,7 @@ pub(crate) fn sliding_torque_nm<const N: usize>(
     torque_before_sliding(&trace, direction)
 }
 
-/// Torque of the last cycle before the joint slid, positive along `direction`.
+/// Returns the torque of the last cycle before the joint slid, positive along `direction`.
 fn torque_before_sliding(trace: &[(f64, f64)], direction: f64) -> Option<f64> {
     let start = trace.first()?.1;
     let slid = |q: f64| direction * (q - start) > SLIDING_RAD;

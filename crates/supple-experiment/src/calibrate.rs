@@ -1,8 +1,8 @@
 //! Complete identification of the simulated arm: breakaway, excitation, fit, validation.
 //!
-//! The controller starts with data-sheet errors in its model. The fit has this model as a weak prior, and else only what the arm
-//! logs: noisy, quantised angles and commanded torques. The ground truth is used only to report errors. This
-//! is simulation: on real arms of this kind the best published models leave 6.7 to 8.4 % of the torque
+//! The controller starts with data-sheet errors in its model. The fit has this model as a weak prior; all its other information
+//! is the log of the arm: noisy, quantised angles and commanded torques. The ground truth is used only to report errors. These
+//! are results of a simulation: on real arms of this kind the best published models leave 6.7 to 8.4 % of the torque
 //! unexplained.
 
 use crate::breakaway::{JointBreakaway, breakaway};
@@ -20,7 +20,7 @@ use std::path::PathBuf;
 use supple_core::dynamics::gravity;
 use supple_core::ripple::{Harmonic, compensation_nm};
 use supple_core::{Config, RippleTable, Vector};
-use supple_ident::design::{DesignOptions, ExcitationDesign, design};
+use supple_ident::excitation_design::{DesignOptions, ExcitationDesign, design};
 use supple_ident::{
     Effects, Fit, FrictionChoice, FrictionColumns, Log, Motion, Preparation, Procedure,
     RippleSearch, Validation, fit_ripple, fit_with_stribeck,
@@ -83,8 +83,8 @@ impl Calibration {
 }
 
 impl Calibration {
-    /// Whether the motors ripple, so that runs at constant speed are needed.
-    fn ripples(&self) -> bool {
+    /// Returns whether the motors have torque ripple, so that runs at constant speed are needed.
+    fn has_ripple(&self) -> bool {
         let options = [self.plant.ripple_nm, self.plant.torque_ripple_fraction];
         self.ripple_nm > 0.0 || options.into_iter().flatten().any(|size| size > 0.0)
     }
@@ -93,17 +93,17 @@ impl Calibration {
 /// Accuracy of an identified model against the plant.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct ModelAccuracy {
-    /// Root mean square of the gravity error relative to that of gravity, at random poses.
+    /// Root mean square error of the gravity torque relative to the root mean square gravity torque, at random poses.
     pub gravity_relative: f64,
-    /// Root mean square error of the friction curve from 0.02 to 0.5 rad/s in both directions, relative to that
+    /// Root mean square error of the friction curve from 0.02 to 0.5 rad/s in both directions, relative to the root mean square
     /// of the curve, for each joint.
     pub friction_relative: Vec<f64>,
 }
 
 /// Results of a calibration.
 #[derive(Clone, Debug)]
-pub struct Calibrated<const N: usize> {
-    /// Measured breakaway of each joint with the plant's own \[N m\]; empty if it was not measured.
+pub struct CalibrationResult<const N: usize> {
+    /// Measured breakaway torque of each joint, and the plant's breakaway torque \[N m\]; empty if it was not measured.
     pub breakaway: Vec<(JointBreakaway, f64)>,
     /// The designed excitation.
     pub designed: ExcitationDesign<N>,
@@ -115,13 +115,13 @@ pub struct Calibrated<const N: usize> {
     pub description: Description,
     /// Validation on a held-out motion.
     pub validation: Validation,
-    /// The held-out motion, with the identified ripple in its torques, for figures.
+    /// The held-out motion, whose torques include the identified ripple, for figures.
     pub held_out: Motion,
     /// Accuracy against the ground truth.
     pub truth: ModelAccuracy,
 }
 
-/// The plant of a calibration: the description's plant with noise and ripple.
+/// Returns the plant of a calibration: the description's plant with noise and ripple.
 ///
 /// # Errors
 /// If the description does not have `N` joints.
@@ -144,8 +144,8 @@ pub fn plant_of<const N: usize>(
     Ok(calibration.plant.apply(plant)?)
 }
 
-/// Two harmonics for each motor, with seeded phases. Where a motor drives one joint alone, their amplitudes at the joint add up to
-/// `ripple_nm`; at a differential each of two motors adds less.
+/// Returns two harmonics for each motor, with seeded phases. If a motor drives one joint alone, their amplitudes at the joint sum
+/// to `ripple_nm`; at a differential each of the two motors contributes less.
 fn ripple<const N: usize>(plant: &PlantConfig<N>, calibration: &Calibration) -> Vec<Ripple> {
     let mut random = ChaCha8Rng::seed_from_u64(calibration.seed ^ 0x7269);
     let to_joint = &plant.actuators.joint_from_motor;
@@ -165,7 +165,7 @@ fn ripple<const N: usize>(plant: &PlantConfig<N>, calibration: &Calibration) -> 
     lines
 }
 
-/// The description of a calibration's plant: `description` with the plant's torque ripple.
+/// Returns the description of a calibration's plant: `description` with the plant's torque ripple.
 ///
 /// # Errors
 /// If the description does not have `N` joints.
@@ -191,7 +191,7 @@ pub fn calibrate<const N: usize>(
     description: &Description,
     calibration: &Calibration,
     progress: &mut dyn FnMut(&str),
-) -> Result<Calibrated<N>, ExperimentError> {
+) -> Result<CalibrationResult<N>, ExperimentError> {
     let nominal = description.config::<N>()?;
     let start = calibration.start.apply(&nominal)?;
     let plant = plant_of::<N>(description, calibration)?;
@@ -203,7 +203,7 @@ pub fn calibrate<const N: usize>(
     let slow = slow_motion(&free, &home, &joints)?;
     if calibration.breakaway {
         let mut compensated = start;
-        if calibration.ripples() {
+        if calibration.has_ripple() {
             progress("torque ripple, from runs at constant speed");
             compensated.ripple = identify_ripple(&start, &plant, &home)?;
         }
@@ -218,7 +218,7 @@ pub fn calibrate<const N: usize>(
     let search = |seed, candidates| DesignOptions {
         seed,
         candidates,
-        ..DesignOptions::of(&joints)
+        ..DesignOptions::new(&joints)
     };
     let excitation_options = search(calibration.seed, calibration.candidates);
     let designed = design(&free, &home, &excitation_options, &mut |_, _| {})?;
@@ -231,7 +231,7 @@ pub fn calibrate<const N: usize>(
 
     progress("excitation");
     let mut series = vec![designed.series, slow, validation_series];
-    if calibration.ripples() {
+    if calibration.has_ripple() {
         series.extend(constant_speed_runs(&free, &home, &joints)?);
     }
     let sequence = excitation("excitation", &free, &plant, &home, &series);
@@ -254,7 +254,7 @@ pub fn calibrate<const N: usize>(
     let thresholds = fit.move_collision_nm(core::slice::from_ref(&validation), &nominal);
     let described = described.with_move_collision(&thresholds)?;
     let truth = model_accuracy(&described.config::<N>()?, &plant, calibration.seed);
-    Ok(Calibrated {
+    Ok(CalibrationResult {
         breakaway: breakaway_results,
         designed,
         fit,
@@ -266,7 +266,8 @@ pub fn calibrate<const N: usize>(
     })
 }
 
-/// All joints at zero, or as close to it as their limits permit: upright for a WAM, with little gravity torque.
+/// Returns the pose with all joints at zero, or as close to zero as their limits permit: upright for a WAM, with little gravity
+/// torque.
 pub(crate) fn upright<const N: usize>(config: &Config<N>) -> Vector<N> {
     let limits = &config.limits;
     Vector::from_fn(|i, _| {
@@ -279,7 +280,7 @@ pub(crate) fn upright<const N: usize>(config: &Config<N>) -> Vector<N> {
     })
 }
 
-/// The log with the torques that the motors gave by these tables: commanded torques plus ripple.
+/// Returns the log with the torques of the motors according to these tables: commanded torques plus ripple.
 pub fn with_ripple_torque<const N: usize>(
     log: &Log,
     tables: &[RippleTable; N],
@@ -318,14 +319,15 @@ pub fn identify<const N: usize>(
 pub struct FitOptions {
     /// Friction terms that are fitted.
     pub friction: FrictionColumns,
-    /// Weight of the link parameters of the starting model as a prior, see [`supple_ident::consistent::Constraints::prior_weight`].
+    /// Weight of the link parameters of the starting model as a prior, see
+    /// [`supple_ident::constrained_least_squares::Constraints::prior_weight`].
     pub prior_weight: f64,
     /// Prior standard deviation of the rotor inertias relative to those of the starting model; `None`: no prior.
     pub rotor_deviation: Option<f64>,
 }
 
 impl FitOptions {
-    /// With these friction terms, a small prior weight, and no prior of the rotor inertias.
+    /// Creates options with these friction terms, a small prior weight, and no prior of the rotor inertias.
     pub fn new(friction: FrictionColumns) -> FitOptions {
         FitOptions {
             friction,
@@ -335,7 +337,7 @@ impl FitOptions {
     }
 }
 
-/// As [`identify`], with friction terms and priors; samples of a joint slower than `slow_rad_per_s` are excluded.
+/// Does the same as [`identify`], with friction terms and priors; excludes samples of a joint slower than `slow_rad_per_s`.
 ///
 /// # Errors
 /// [`ExperimentError::Ident`].

@@ -1,20 +1,21 @@
 //! Runs all experiments of the paper.
 
-use crate::adapted::{Adapted, Performed, expected_s, may_adapt, perform};
+use crate::adapted::{Adapted, JobOutcome, expected_s, may_adapt, perform};
 use crate::demo_options::DemoOptions;
 use crate::error::ExperimentError;
 use crate::job::{
-    Job, JobResult, Probing, QUADRANT, QUADRANT_FAST, QUADRANT_PERTURBED, SEEDS, SPEEDS, jobs,
+    Job, JobResult, ProbingVariant, QUADRANT, QUADRANT_FAST, QUADRANT_PERTURBED, SEEDS, SPEEDS,
+    jobs,
 };
 use crate::metrics::{LineFit, spread};
 use crate::probing::{Stroke, median_stroke};
-use crate::realistic::{REALISTIC_S, Realistic, realistic_seed};
+use crate::realistic::{REALISTIC_S, RealisticRuns, realistic_seed};
 use crate::run::Run;
 use crate::scenario;
 use crate::setup::Setup;
 use crate::summary::{
-    AtSpeed, ContactStatistics, DerivedArm, ExactModel, ImpulseSlope, ProbingSummary,
-    QuadrantSummary, Summary, TorqueRms, TrackingError,
+    ContactStatistics, DerivedArm, ExactModel, ImpulseSlope, ProbingSummary, QuadrantSummary,
+    Summary, TorqueRms, TrackingAtSpeed, TrackingError,
 };
 use rayon::prelude::*;
 use supple_core::trajectory::Quadrant;
@@ -28,7 +29,7 @@ pub struct Progress {
     pub done_s: f64,
     /// Planned simulated time of all runs \[s\].
     pub total_s: f64,
-    /// Name of the run that has just ended.
+    /// Name of the last completed run.
     pub finished: String,
 }
 
@@ -39,7 +40,7 @@ pub struct ProbingRun {
     pub run: Run,
     /// Contact of each stroke.
     pub strokes: Vec<Stroke>,
-    /// Its entry in the summary.
+    /// Summary of the run.
     pub summary: ProbingSummary,
 }
 
@@ -52,8 +53,8 @@ pub struct Demo {
     pub sinusoids: Vec<(f64, Run)>,
     /// The arc.
     pub arc: Run,
-    /// Figure 3b: with the exact model, with the perturbed model, at the paper's maximum speed, and there with
-    /// more damping and with ramps at its corners.
+    /// Figure 3b: with the exact model, with the perturbed model, at the paper's maximum speed, and at that speed with
+    /// more damping and with ramps at the corners.
     pub quadrants: [(Quadrant, Run); 5],
     /// Figures 5 and 6.
     pub probing: Vec<ProbingRun>,
@@ -111,7 +112,7 @@ fn sized<const N: usize>(
             report(expected(job), job.name());
             Ok(done)
         })
-        .collect::<Result<Vec<Performed>, ExperimentError>>()?;
+        .collect::<Result<Vec<JobOutcome>, ExperimentError>>()?;
     let adapted = results.iter().filter_map(|done| done.adapted.clone());
     let adapted: Vec<Adapted> = adapted.collect();
     let results = results.into_iter().map(|done| done.result).collect();
@@ -122,7 +123,7 @@ fn sized<const N: usize>(
         Ok(done)
     });
     let realistic = realistic.collect::<Result<Vec<_>, ExperimentError>>()?;
-    let realistic = (seeds > 0).then(|| Realistic::of(&realistic));
+    let realistic = (seeds > 0).then(|| RealisticRuns::of(&realistic));
     let mut demo = assemble(description, options, &jobs, results, realistic);
     demo.summary.adapted = adapted;
     if may_adapt(description, options) {
@@ -135,13 +136,13 @@ fn sized<const N: usize>(
     Ok(demo)
 }
 
-/// Effects of the arm that the realistic runs are about, and the model that they use instead of calibrating.
+/// Returns the effects of the arm of the realistic runs, and the model that they use instead of calibrating.
 fn realistic_arm<'a>(
     description: &Description,
     options: &'a DemoOptions,
 ) -> (PlantOptions, Option<&'a Description>) {
     match options.plant.is_none() {
-        // A given model is that of another plant: each seed is calibrated.
+        // A given model belongs to another plant, so each seed is calibrated.
         true => (PlantOptions::realistic_of(description), None),
         false => (options.plant.clone(), options.model.as_ref()),
     }
@@ -208,21 +209,21 @@ fn slopes(runs: &[ProbingSummary]) -> Vec<ImpulseSlope> {
         .collect()
 }
 
-/// Distributes the job results.
-struct Results {
+/// Results of all jobs, from which each result is taken once.
+struct JobResults {
     paths: Paths,
     jobs: Vec<Job>,
     done: Vec<Option<JobResult>>,
 }
 
-impl Results {
+impl JobResults {
     fn take(&mut self, job: Job) -> JobResult {
         let index = self.jobs.iter().position(|other| *other == job);
         let done = index.and_then(|index| self.done[index].take());
         done.expect("every job is run once and taken once")
     }
 
-    fn probing(&mut self, stiffness: &[f64], kind: Probing) -> Vec<ProbingRun> {
+    fn probing(&mut self, stiffness: &[f64], kind: ProbingVariant) -> Vec<ProbingRun> {
         let runs = stiffness.iter().filter_map(|stiffness_n_per_m| {
             let stiffness_n_per_m = *stiffness_n_per_m;
             let done = self.take(Job::Probing {
@@ -255,9 +256,9 @@ fn assemble(
     options: &DemoOptions,
     jobs: &[Job],
     done: Vec<JobResult>,
-    realistic: Option<Realistic>,
+    realistic: Option<RealisticRuns>,
 ) -> Demo {
-    let mut results = Results {
+    let mut results = JobResults {
         paths: description.paths(),
         jobs: jobs.to_vec(),
         done: done.into_iter().map(Some).collect(),
@@ -275,10 +276,10 @@ fn assemble(
     let (ramped, quadrant_corner_ramp) = results.quadrant(Job::QuadrantCornerRamp);
     let all = &scenario::PROBING_STIFFNESS_N_PER_M;
     let two = &scenario::PAPER_STIFFNESS_N_PER_M;
-    let probing = results.probing(all, Probing::Plain);
-    let probing_fade_off = results.probing(all, Probing::FadeOff);
+    let probing = results.probing(all, ProbingVariant::Plain);
+    let probing_fade_off = results.probing(all, ProbingVariant::FadeOff);
     let [probing_exact, probing_rubber, probing_apparent] =
-        Probing::AT_TWO.map(|kind| results.probing(two, kind));
+        ProbingVariant::AT_TWO.map(|kind| results.probing(two, kind));
     let apparent_inertia = results.take(Job::ApparentInertia).run;
     let summaries = |runs: &[ProbingRun]| -> Vec<ProbingSummary> {
         runs.iter().map(|run| run.summary.clone()).collect()
@@ -287,7 +288,7 @@ fn assemble(
     let fade_off = summaries(&probing_fade_off);
     let law_as_printed = results.take(Job::LawAsPrinted).run;
     let exact =
-        |results: &mut Results, stribeck| tracking(&results.take(Job::Exact { stribeck }).run);
+        |results: &mut JobResults, stribeck| tracking(&results.take(Job::Exact { stribeck }).run);
     let perturbed_runs: Vec<TrackingError> = (0..SEEDS)
         .map(|seed| tracking(&results.take(Job::Seed(seed)).run))
         .collect();
@@ -305,7 +306,7 @@ fn assemble(
         sinusoid: tracking(headline),
         sinusoid_by_speed: sinusoids
             .iter()
-            .map(|(speed, run)| AtSpeed {
+            .map(|(speed, run)| TrackingAtSpeed {
                 speed: *speed,
                 tracking: tracking(run),
             })
@@ -361,7 +362,7 @@ mod tests {
     use supple_plant::PlantOptions;
 
     #[test]
-    fn a_given_model_serves_only_the_plant_that_is_given_with_it() {
+    fn a_given_model_is_used_only_with_the_given_plant() {
         let arm = Description::asset("wam4").expect("a built-in arm");
         let mut options = DemoOptions {
             seed: 0,

@@ -16,6 +16,6 @@ pub struct DemoOptions {
     pub model: Option<Description>,
     /// Effects of a real arm in the plant of every run.
     pub plant: PlantOptions,
-    /// Number of seeds on the realistic plant, or on that of `plant` if it has options; zero leaves these runs out.
+    /// Number of seeds on the realistic plant, or on the plant of `plant` if that has options; zero leaves these runs out.
     pub realistic_seeds: u64,
 }

@@ -1,4 +1,4 @@
-//! How an arm may differ from the model of its controller without anybody having identified it again.
+//! Deviations of an arm from the model of its controller that arise after the identification.
 
 use crate::error::ExperimentError;
 use nalgebra::Vector4;
@@ -64,7 +64,7 @@ impl Deviation {
                 plant.arm = with_payload(arm, Some(&payload))?;
             }
             Deviation::Tilt(x_rad, y_rad) => {
-                // The base turns, so that gravity turns the other way in its axes.
+                // If the base rotates, gravity rotates in the opposite direction in base axes.
                 let turn = Rotation3::from_scaled_axis(Vector3::new(-x_rad, -y_rad, 0.0));
                 plant.arm = rebuilt(*arm.links(), 1.0, turn * arm.gravity())?;
             }

@@ -1,7 +1,8 @@
-//! Which effects of a real arm ruin low stiffness: tracking at 5 N/m with each effect alone and with all together.
+//! Measures which effects of a real arm prevent tracking at low stiffness: tracking at 5 N/m with each effect alone and with all
+//! effects together.
 //!
-//! The plant has the effect; the controller's model comes from one of the [`ModelSource`]s. Nothing in the controller
-//! contains the effect otherwise. The sizes of single effects are larger than in `realistic`; all are assumptions, see
+//! The plant has the effect; the controller's model comes from one of the [`ModelSource`]s, and the controller has no other
+//! information about the effect. Single effects are larger than in `realistic`; all sizes are assumptions, see
 //! `supple plant list`.
 
 use crate::calibrate::{Calibration, calibrate};
@@ -17,7 +18,7 @@ use supple_core::Trajectory;
 use supple_model::{Description, with_dof};
 use supple_plant::{PlantOptions, Scene};
 
-/// Motion before the error of a learning controller counts: three periods of the sinusoid \[s\].
+/// Time of motion after which the error of a learning controller is measured: three periods of the sinusoid \[s\].
 pub const LEARNING_S: f64 = 24.0;
 
 /// An effect with its size.
@@ -29,27 +30,27 @@ pub struct Effect {
     pub options: PlantOptions,
 }
 
-/// Where the controller's model is from.
+/// Source of the controller's model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ModelSource {
     /// The description, without the effect: a model identified without it.
     Nominal,
-    /// A calibration on the arm with the effect, as `supple calibrate` does it, with ripple runs if a motor ripples.
+    /// A calibration on the arm with the effect, as by `supple calibrate`, with ripple runs if a motor has torque ripple.
     Calibrated,
-    /// The same, refined while the arm moves. Errors count after [`LEARNING_S`] of motion.
+    /// The calibrated model, which the learner refines while the arm moves. Errors are measured after [`LEARNING_S`] of motion.
     Learning,
 }
 
 impl ModelSource {
-    /// All, in the order of the table.
+    /// All sources, in the order of the table.
     pub const ALL: [ModelSource; 3] = [
         ModelSource::Nominal,
         ModelSource::Calibrated,
         ModelSource::Learning,
     ];
 
-    /// Head of the table's columns.
+    /// Returns the header of the table's column.
     pub fn name(self) -> &'static str {
         match self {
             ModelSource::Nominal => "not calibrated",
@@ -66,9 +67,9 @@ pub struct FreeMotion {
     pub sinusoid_rms_m: f64,
     /// Root mean square tip error on the arc \[m\].
     pub arc_rms_m: f64,
-    /// Times at which the contact latch reported a contact; nothing is there to touch.
+    /// Number of contacts that the contact latch reported; all are false, because the space is empty.
     pub false_latches: usize,
-    /// The first fault that ended a run early; its errors are those before it.
+    /// The first fault that ended a run early; the errors of that run are measured before the fault.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ended: Option<FaultEnd>,
 }
@@ -78,13 +79,13 @@ pub struct FreeMotion {
 pub struct EffectRun {
     /// The effect.
     pub effect: &'static str,
-    /// Where the model is from.
+    /// Source of the model.
     pub model: ModelSource,
     /// Seed of the calibration, the noise, and the signs and phases of the effect.
     pub seed: u64,
     /// The motion; `None` if calibration or motion failed.
     pub motion: Option<FreeMotion>,
-    /// Why it failed.
+    /// Reason of the failure.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub failed: Option<String>,
 }
@@ -95,7 +96,7 @@ fn effect(name: &'static str, set: impl FnOnce(&mut PlantOptions)) -> Effect {
     Effect { name, options }
 }
 
-/// The rows of the table: none, each effect alone, all at modest size.
+/// Returns the rows of the table: no effect, each effect alone, all effects at modest size.
 pub fn effects(arm: &Description) -> Vec<Effect> {
     vec![
         effect("none", |_| {}),
@@ -168,8 +169,8 @@ pub fn effects(arm: &Description) -> Vec<Effect> {
     ]
 }
 
-/// Runs every effect with every model and seed, on all cores. `progress` receives the number of effects with their seeds
-/// that are done, and of all. The results are in the order of effects, seeds and models.
+/// Runs every effect with every model and seed, on all cores. `progress` receives the number of completed pairs of effect and
+/// seed, and their total number. The results are in the order of effects, seeds and models.
 ///
 /// # Errors
 /// [`ExperimentError`] if the arm cannot do the motions. A calibration that fails is a result.
@@ -186,9 +187,10 @@ pub fn run_effects(
         .collect();
     let done = AtomicUsize::new(0);
     let each = jobs.par_iter().map(|(effect, seed)| {
-        let runs = with_dof!(description.dof(), N => one::<N>(description, effect, models, *seed))
-            .map_err(ExperimentError::from)
-            .flatten();
+        let runs =
+            with_dof!(description.dof(), N => run_effect::<N>(description, effect, models, *seed))
+                .map_err(ExperimentError::from)
+                .flatten();
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         progress(done, jobs.len(), effect.name);
         runs
@@ -197,7 +199,7 @@ pub fn run_effects(
     Ok(each?.into_iter().flatten().collect())
 }
 
-fn one<const N: usize>(
+fn run_effect<const N: usize>(
     description: &Description,
     effect: &Effect,
     models: &[ModelSource],
@@ -227,8 +229,8 @@ fn one<const N: usize>(
     models.iter().map(run).collect()
 }
 
-/// What the arm makes of an experiment is a result, also that it cannot be done: a fault outside of the trajectory, a
-/// refused request, a joint that sticks, a fit that is refused. Other errors are errors.
+/// Converts errors that mean that the arm cannot perform the experiment to a result: a fault outside of the trajectory, a
+/// refused request, a joint that sticks, a fit that is refused. Returns other errors.
 pub(crate) fn result_or_error<T>(
     done: Result<T, ExperimentError>,
 ) -> Result<Result<T, String>, ExperimentError> {
@@ -245,7 +247,7 @@ pub(crate) fn result_or_error<T>(
     }
 }
 
-/// The model of a calibration on the arm with these options.
+/// Returns the model of a calibration on the arm with these options.
 ///
 /// # Errors
 /// As [`calibrate`].
@@ -261,7 +263,8 @@ pub fn calibrated<const N: usize>(
     Ok(calibrate::<N>(description, &calibration, &mut |_| {})?.description)
 }
 
-/// Sinusoid and arc at 5 N/m in empty space. With `learning` each goes on for [`LEARNING_S`] before its error counts.
+/// Tracks the sinusoid and the arc at 5 N/m in empty space. With `learning`, the error is measured after [`LEARNING_S`] of each
+/// motion.
 ///
 /// # Errors
 /// [`ExperimentError`]; a fault is a result.
@@ -272,7 +275,7 @@ pub fn free_motion<const N: usize>(
     free_motion_at(setup, scenario::STIFFNESS_N_PER_M, learning)
 }
 
-/// As [`free_motion`] at another stiffness.
+/// Does the same as [`free_motion`] at another stiffness.
 ///
 /// # Errors
 /// As [`free_motion`].
@@ -307,7 +310,7 @@ pub fn free_motion_at<const N: usize>(
             latched = now;
             Ok(())
         })?;
-        // A fault while learning: the error before it.
+        // After a fault while learning, the error before the fault is the result.
         let rms_m = if error.is_empty() {
             run.rms_error_m
         } else {

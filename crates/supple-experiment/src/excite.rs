@@ -7,7 +7,7 @@ use supple_core::controller::Request;
 use supple_core::trajectory::Fourier;
 use supple_core::{Config, Vector};
 use supple_ident::IdentError;
-use supple_ident::design::{constant_speed_series, slow_series};
+use supple_ident::excitation_design::{constant_speed_series, slow_series};
 use supple_plant::PlantConfig;
 
 /// Gravity hold before the first move \[s\].
@@ -21,7 +21,8 @@ const RUNS: ([f64; 2], f64) = ([0.05, 0.1], 40.0);
 /// Mean joint speed of the moves between series, where the limits allow it \[rad/s\].
 const MOVE_RAD_PER_S: f64 = 0.4;
 
-/// Request sequence that moves to and records each series in turn; the plant starts at rest at `home_rad`.
+/// Returns a request sequence that moves to the start of each series and records the series, one after the other; the plant
+/// starts at rest at `home_rad`.
 pub fn excitation<const N: usize>(
     name: &str,
     config: &Config<N>,
@@ -49,7 +50,7 @@ pub fn excitation<const N: usize>(
     }
 }
 
-/// One minute of motion of each of `joints` up to 0.1 rad/s, in which dry friction dominates.
+/// Returns one minute of motion of each of `joints` up to 0.1 rad/s, in which dry friction dominates.
 ///
 /// # Errors
 /// Options out of range.
@@ -62,7 +63,7 @@ pub fn slow_motion<const N: usize>(
     slow_series(config, home_rad, joints, speed_rad_per_s, period_s)
 }
 
-/// Back-and-forth motion of each of `joints` at constant speeds, for the identification of torque ripple.
+/// Returns back-and-forth motion of each of `joints` at constant speeds, for the identification of torque ripple.
 ///
 /// # Errors
 /// Options out of range.
@@ -76,7 +77,7 @@ pub fn constant_speed_runs<const N: usize>(
     speeds.into_iter().map(run).collect()
 }
 
-/// A move followed by a rest. It is as slow as the limits of joints and tip require.
+/// Returns a move followed by a rest. The move is as slow as the limits of joints and tip require.
 pub(crate) fn move_to<const N: usize>(
     config: &Config<N>,
     target_rad: &Vector<N>,
@@ -91,7 +92,7 @@ pub(crate) fn move_to<const N: usize>(
     Step::wait(request, duration_s + REST_S)
 }
 
-/// The configuration without held joints, so that all joints can be excited.
+/// Returns the configuration without held joints, so that all joints can be excited.
 pub(crate) fn without_held_joints<const N: usize>(config: &Config<N>) -> Config<N> {
     Config {
         roles: [supple_core::config::Role::Active; N],

@@ -4,8 +4,8 @@ use crate::demo_options::DemoOptions;
 use crate::error::ExperimentError;
 use crate::metrics::Rms;
 use crate::mismatch::Mismatch;
-use crate::probing::{ContactMeter, Stroke, effective_mass_kg};
-use crate::quadrant::{Edge, EdgeMeter};
+use crate::probing::{ContactAccumulator, Stroke, effective_mass_kg};
+use crate::quadrant::{SegmentErrorAccumulator, SegmentPass};
 use crate::record::Recorder;
 use crate::run::{Plan, Run, run};
 use crate::scenario;
@@ -47,14 +47,14 @@ pub(crate) enum Job {
     LawAsPrinted,
     Probing {
         stiffness_n_per_m: f64,
-        kind: Probing,
+        kind: ProbingVariant,
     },
     ApparentInertia,
 }
 
-/// What differs between probing runs.
+/// Variant of a probing run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Probing {
+pub(crate) enum ProbingVariant {
     /// Perturbed model, friction feed-forward fades in contact.
     Plain,
     /// The friction feed-forward stays on.
@@ -67,19 +67,23 @@ pub(crate) enum Probing {
     ApparentInertia,
 }
 
-impl Probing {
-    /// The runs over all stiffnesses.
-    pub const OVER_ALL: [Probing; 2] = [Probing::Plain, Probing::FadeOff];
-    /// The runs at the stiffnesses of the paper's figure 5.
-    pub const AT_TWO: [Probing; 3] = [Probing::Exact, Probing::Rubber, Probing::ApparentInertia];
+impl ProbingVariant {
+    /// The variants that run at all stiffnesses.
+    pub const OVER_ALL: [ProbingVariant; 2] = [ProbingVariant::Plain, ProbingVariant::FadeOff];
+    /// The variants that run only at the stiffnesses of the paper's figure 5.
+    pub const AT_TWO: [ProbingVariant; 3] = [
+        ProbingVariant::Exact,
+        ProbingVariant::Rubber,
+        ProbingVariant::ApparentInertia,
+    ];
 
     fn suffix(self) -> &'static str {
         match self {
-            Probing::Plain => "",
-            Probing::FadeOff => "_fade_off",
-            Probing::Exact => "_exact",
-            Probing::Rubber => "_rubber",
-            Probing::ApparentInertia => "_apparent_inertia",
+            ProbingVariant::Plain => "",
+            ProbingVariant::FadeOff => "_fade_off",
+            ProbingVariant::Exact => "_exact",
+            ProbingVariant::Rubber => "_rubber",
+            ProbingVariant::ApparentInertia => "_apparent_inertia",
         }
     }
 }
@@ -101,18 +105,18 @@ pub(crate) const QUADRANT_FAST: Job = Job::Quadrant {
 pub(crate) struct JobResult {
     pub run: Run,
     pub strokes: Vec<Stroke>,
-    pub edges: Vec<Edge>,
+    pub edges: Vec<SegmentPass>,
     pub free_rms_m: f64,
-    /// Mass with which the tip of a probing run meets the block \[kg\]; zero in others.
+    /// Effective mass of the tip at the first touch of the block in a probing run \[kg\]; zero in other runs.
     pub effective_mass_kg: f64,
     /// Damping of the law along base axis x \[N s/m\].
     pub damping_n_s_per_m: f64,
-    /// The quadrant that was run, if it was one.
+    /// The quadrant of the run, if its trajectory is a quadrant.
     pub quadrant: Option<Quadrant>,
 }
 
 impl JobResult {
-    /// Of a job that was left out: no samples, and errors that are not numbers.
+    /// Returns the result of a job that was left out: no samples, and errors that are not numbers.
     pub fn left_out<const N: usize>(job: &Job, plan: Option<&Plan<N>>) -> JobResult {
         JobResult {
             run: Run::left_out(job.name()),
@@ -133,7 +137,7 @@ fn quadrant_of(trajectory: &Trajectory) -> Option<Quadrant> {
     }
 }
 
-/// All runs, the longest first so that all cores finish at about the same time.
+/// Returns all runs, the longest first so that all cores finish at about the same time.
 pub(crate) fn jobs() -> Vec<Job> {
     let mut jobs = Vec::new();
     let mut probing = |stiffness: &[f64], kind| {
@@ -142,10 +146,10 @@ pub(crate) fn jobs() -> Vec<Job> {
             kind,
         }));
     };
-    for kind in Probing::OVER_ALL {
+    for kind in ProbingVariant::OVER_ALL {
         probing(&scenario::PROBING_STIFFNESS_N_PER_M, kind);
     }
-    for kind in Probing::AT_TWO {
+    for kind in ProbingVariant::AT_TWO {
         probing(&scenario::PAPER_STIFFNESS_N_PER_M, kind);
     }
     jobs.extend(SPEEDS.map(|speed| Job::Sinusoid { speed }));
@@ -160,7 +164,7 @@ pub(crate) fn jobs() -> Vec<Job> {
 }
 
 impl Job {
-    /// Whether a fault is the expected result: of the equation as printed.
+    /// Returns whether a fault is an expected result, as with the equation as printed.
     pub fn may_fault(&self) -> bool {
         *self == Job::LawAsPrinted
     }
@@ -215,9 +219,9 @@ impl Job {
                 ..Variant::EXACT
             },
             Job::Probing { kind, .. } => Variant {
-                fade: kind != Probing::FadeOff,
+                fade: kind != ProbingVariant::FadeOff,
                 ..match kind {
-                    Probing::Exact => Variant::EXACT,
+                    ProbingVariant::Exact => Variant::EXACT,
                     _ => perturbed(0),
                 }
             },
@@ -242,7 +246,7 @@ impl Job {
         }
     }
 
-    /// The quadrant of figure 3b of this job, and its duration \[s\].
+    /// Returns the quadrant of figure 3b of this job, and its duration \[s\].
     pub fn quadrant(&self, paths: &Paths) -> (Quadrant, f64) {
         let speed_m_per_s = match *self {
             Job::Quadrant { speed_m_per_s, .. } => speed_m_per_s,
@@ -252,7 +256,7 @@ impl Job {
         if *self != Job::QuadrantCornerRamp {
             return (quadrant, duration_s);
         }
-        // Two rounds have six corners.
+        // Two laps have six corners.
         let with_ramps = quadrant.with_corner_ramp(scenario::CORNER_RAMP_S);
         (with_ramps, duration_s + 6.0 * scenario::CORNER_RAMP_S)
     }
@@ -275,10 +279,10 @@ impl Job {
             } => {
                 config.law.gains = scenario::gains_like(&config.law.gains, stiffness_n_per_m);
                 scene = match kind {
-                    Probing::Rubber => scenario::rubber_block_at(&paths),
+                    ProbingVariant::Rubber => scenario::rubber_block_at(&paths),
                     _ => scenario::block_at(&paths),
                 };
-                apparent = kind == Probing::ApparentInertia;
+                apparent = kind == ProbingVariant::ApparentInertia;
             }
             Job::QuadrantDamped => {
                 let damping = Vector3::repeat(scenario::CORNER_DAMPING_N_S_PER_M);
@@ -318,31 +322,31 @@ impl Job {
             None => None,
         };
         let mut contact = match plan.trajectory {
-            Trajectory::Probe(probe) => Some((ContactMeter::new(probe), probe)),
+            Trajectory::Probe(probe) => Some((ContactAccumulator::new(probe), probe)),
             _ => None,
         };
         let mut edges = match plan.trajectory {
-            Trajectory::Quadrant(quadrant) => Some(EdgeMeter::new(quadrant)),
+            Trajectory::Quadrant(quadrant) => Some(SegmentErrorAccumulator::new(quadrant)),
             _ => None,
         };
         let face_m = plan.plant.tip_radius_m + description.paths().face_m();
         let mut free = Rms::default();
         let run = run(plan, &mut |cycle, time_s| {
             if let Some(recorder) = &mut recorder {
-                recorder.cycle(cycle)?;
+                recorder.write_cycle(cycle)?;
             }
             let (Some(time_s), Some(reference)) = (time_s, cycle.output.reference) else {
                 return Ok(());
             };
             let error_m = (reference.position - cycle.truth.tip_position_m).norm();
             if let Some((meter, probe)) = &mut contact {
-                meter.cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
+                meter.add_cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
                 if is_free(probe, time_s, reference.position.z - face_m) {
                     free.add(error_m);
                 }
             }
-            if let Some(meter) = &mut edges {
-                meter.cycle(time_s, error_m);
+            if let Some(accumulator) = &mut edges {
+                accumulator.add_cycle(time_s, error_m);
             }
             Ok(())
         })?;
@@ -352,7 +356,7 @@ impl Job {
         Ok(JobResult {
             run,
             strokes: contact.map_or_else(Vec::new, |(meter, _)| meter.finish()),
-            edges: edges.map_or_else(Vec::new, EdgeMeter::finish),
+            edges: edges.map_or_else(Vec::new, SegmentErrorAccumulator::finish),
             free_rms_m: free.rms(),
             effective_mass_kg: touch_mass_kg(plan, face_m),
             damping_n_s_per_m: plan.config.law.gains.damping_n_s_per_m.x,
@@ -361,8 +365,8 @@ impl Job {
     }
 }
 
-/// Mass with which the plant's tip meets the block in the first stroke, its centre then at `face_m` \[kg\]; zero without
-/// a stroke.
+/// Returns the effective mass of the plant's tip at the first touch of the block, with the centre of the tip at the height
+/// `face_m` \[kg\]; zero without a stroke.
 fn touch_mass_kg<const N: usize>(plan: &Plan<N>, face_m: f64) -> f64 {
     let Trajectory::Probe(probe) = plan.trajectory else {
         return 0.0;
@@ -379,7 +383,7 @@ fn touch_mass_kg<const N: usize>(plan: &Plan<N>, face_m: f64) -> f64 {
     mass.unwrap_or(0.0)
 }
 
-/// Whether the reference descends and is not yet near the block.
+/// Returns whether the reference descends and is not yet near the block.
 fn is_free(probe: &Probe, time_s: f64, above_face_m: f64) -> bool {
     probe.phase_at(time_s).0 == ProbePhase::Down && above_face_m > CLEARANCE_M
 }

@@ -18,12 +18,12 @@ impl Rms {
         self.max_abs = self.max_abs.max(value.abs());
     }
 
-    /// Whether there are no values.
+    /// Returns whether there are no values.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// Root mean square; zero without values.
+    /// Returns the root mean square; zero without values.
     pub fn rms(&self) -> f64 {
         if self.count == 0 {
             return 0.0;
@@ -31,7 +31,7 @@ impl Rms {
         (self.sum_of_squares / self.count as f64).sqrt()
     }
 
-    /// Maximum absolute value; zero without values.
+    /// Returns the maximum absolute value; zero without values.
     pub fn max_abs(&self) -> f64 {
         self.max_abs
     }
@@ -51,7 +51,7 @@ impl Mean {
         self.count += 1;
     }
 
-    /// Mean; zero without values.
+    /// Returns the mean; zero without values.
     pub fn mean(&self) -> f64 {
         if self.count == 0 {
             return 0.0;
@@ -72,7 +72,7 @@ pub struct LineFit {
 }
 
 impl LineFit {
-    /// `None` if the points do not determine a line.
+    /// Fits a line; `None` if the points do not determine one.
     pub fn new(points: &[(f64, f64)]) -> Option<LineFit> {
         let n = points.len() as f64;
         let mean_x = points.iter().map(|p| p.0).sum::<f64>() / n;
@@ -93,7 +93,7 @@ impl LineFit {
     }
 }
 
-/// Median; `None` without values.
+/// Returns the median; `None` without values.
 pub fn median(values: &[f64]) -> Option<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -105,7 +105,7 @@ pub fn median(values: &[f64]) -> Option<f64> {
     }
 }
 
-/// Range relative to the median, (max - min) / median; `None` without values.
+/// Returns the range relative to the median, (max - min) / median; `None` without values.
 pub fn spread(values: &[f64]) -> Option<f64> {
     let median = median(values)?;
     let (min, max) = values.iter().fold((f64::MAX, f64::MIN), |(min, max), v| {
@@ -130,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn medians_and_spreads() {
+    fn the_median_and_the_spread_of_known_values_are_exact() {
         assert_eq!(median(&[3.0, 1.0, 2.0]), Some(2.0));
         assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), Some(2.5));
         assert_eq!(median(&[]), None);
@@ -138,7 +138,7 @@ mod tests {
     }
 
     #[test]
-    fn root_mean_square() {
+    fn the_root_mean_square_of_known_values_is_exact() {
         let mut rms = Rms::default();
         [3.0, -4.0].into_iter().for_each(|x| rms.add(x));
         assert!((rms.rms() - 12.5_f64.sqrt()).abs() < 1e-15);

@@ -7,7 +7,7 @@ use supple_core::nalgebra::Vector3;
 use supple_core::{Arm, ArmError, Body, Config, Friction, Joint};
 
 /// Relative parameter errors of a model. Masses, centres of mass, viscous and dry friction are multiplied by one plus or minus
-/// the fraction; the signs are random, drawn from `seed`, that of Coulomb and breakaway friction of a joint is the same. All other
+/// the fraction. The signs are random, drawn from `seed`; Coulomb and breakaway friction of a joint have the same sign. All other
 /// parameters are exact.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Mismatch {
@@ -20,7 +20,7 @@ pub struct Mismatch {
 }
 
 impl Mismatch {
-    /// Typical errors after a good identification: masses and centres of mass 0.1 %, friction 3 %.
+    /// Returns typical errors after a good identification: masses and centres of mass 0.1 %, friction 3 %.
     pub fn identified(seed: u64) -> Mismatch {
         Mismatch {
             gravity: 1e-3,

@@ -1,8 +1,8 @@
 //! The paper's own identification on its own arm: breakaway for `S`, then Eq. (3.7) and (3.8) with `N` samples.
 //!
 //! `m3` is known, as the paper weighs the last link. The twelve columns have rank ten, so that the result is compared by
-//! its ten determined combinations and by the gravity torque that it predicts. Beside it, this project's own fit of the
-//! same simulated arm.
+//! its ten determined combinations and by the gravity torque that it predicts. For comparison, this project's own fit identifies
+//! the same simulated arm.
 
 use crate::breakaway::{JointBreakaway, breakaway};
 use crate::calibrate::{Calibration, identify, model_accuracy, plant_of, upright};
@@ -14,8 +14,8 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use supple_core::dynamics::{gravity, rnea};
 use supple_core::{Config, Vector};
-use supple_ident::design::{DesignOptions, design};
-use supple_ident::paper::{Estimate, estimate, with_psi};
+use supple_ident::excitation_design::{DesignOptions, design};
+use supple_ident::paper_estimator::{Estimate, estimate, with_psi};
 use supple_ident::{DMatrix, Log, Motion};
 use supple_model::Description;
 use supple_model::paper::Parameters;
@@ -28,8 +28,8 @@ const POSES: usize = 500;
 
 /// Results of the paper's procedure.
 #[derive(Clone, Debug)]
-pub struct PaperProcedure {
-    /// Measured breakaway of each joint, which is taken for `S`, and the plant's `S` \[N m\].
+pub struct PaperProcedureResult {
+    /// Measured breakaway torque of each joint, which the procedure uses as `S`, and the plant's `S` \[N m\].
     pub breakaway: [(JointBreakaway, f64); 3],
     /// Duration of the recorded motion \[s\].
     pub motion_s: f64,
@@ -39,9 +39,9 @@ pub struct PaperProcedure {
     pub estimate: Estimate,
     /// The plant's ten determined combinations, in the order of [`Parameters::BASE_NAMES`].
     pub truth: [f64; 10],
-    /// Root mean square error of the predicted gravity torque relative to that of gravity, at random poses.
+    /// Root mean square error of the predicted gravity torque relative to the root mean square gravity torque, at random poses.
     pub gravity_relative: f64,
-    /// The same of this project's own fit.
+    /// The same error of this project's own fit.
     pub own_gravity_relative: f64,
 }
 
@@ -54,7 +54,7 @@ pub fn paper_procedure(
     calibration: &Calibration,
     samples: usize,
     progress: &mut dyn FnMut(&str),
-) -> Result<PaperProcedure, ExperimentError> {
+) -> Result<PaperProcedureResult, ExperimentError> {
     let description = Description::asset(ARM)?;
     let nominal = description.config::<3>()?;
     let home = description.home::<3>()?;
@@ -75,7 +75,7 @@ pub fn paper_procedure(
     let options = DesignOptions {
         seed: calibration.seed,
         candidates: calibration.candidates,
-        ..DesignOptions::of(&joints)
+        ..DesignOptions::new(&joints)
     };
     let designed = design(&free, &home, &options, &mut |_, _| {})?.series;
     let slow = slow_motion(&free, &home, &joints)?;
@@ -98,7 +98,7 @@ pub fn paper_procedure(
     let model = with_psi(&known, &found.psi);
     let (own, _) = identify(&start, &logs, &[])?;
     let own = own.description(&description, None)?.config::<3>()?;
-    Ok(PaperProcedure {
+    Ok(PaperProcedureResult {
         breakaway: core::array::from_fn(|i| (measured[i], plant.friction[i].coulomb_nm)),
         motion_s: designed.duration_s,
         samples: motion.samples(),
@@ -109,7 +109,7 @@ pub fn paper_procedure(
     })
 }
 
-/// `samples` samples of a motion, evenly spread over it; all if it has fewer.
+/// Returns `samples` samples of a motion, evenly spread over it; all samples if it has fewer.
 fn spread(motion: &Motion, samples: usize) -> Motion {
     let all = motion.samples();
     let kept = samples.min(all);
@@ -124,7 +124,7 @@ fn spread(motion: &Motion, samples: usize) -> Motion {
     }
 }
 
-/// The plant's ten determined combinations: the estimate from the plant's own torques, by recursive Newton-Euler, at the
+/// Returns the plant's ten determined combinations: the estimate from the plant's own torques, by recursive Newton-Euler, at the
 /// states of `motion`.
 fn determined_combinations(
     known: &Parameters,
@@ -146,7 +146,8 @@ fn determined_combinations(
     Ok(estimate(known, &exact)?.base)
 }
 
-/// Root mean square error of the closed form's gravity torque relative to that of the plant's, at random poses.
+/// Returns the root mean square error of the closed form's gravity torque relative to the root mean square of the plant's gravity
+/// torque, at random poses.
 fn gravity_error(limits: &Config<3>, plant: &PlantConfig<3>, model: &Parameters, seed: u64) -> f64 {
     let mut random = ChaCha8Rng::seed_from_u64(seed ^ 0x7061_7065);
     let limits = &limits.limits;

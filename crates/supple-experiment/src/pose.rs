@@ -1,4 +1,4 @@
-//! The pose mode: the tip follows the sinusoid while it turns, with every joint of an arm of six or seven active.
+//! The pose mode: the tip follows the sinusoid while it rotates, with every joint of a six- or seven-joint arm active.
 
 use crate::error::ExperimentError;
 use crate::metrics::Rms;
@@ -21,15 +21,15 @@ use supple_plant::Scene;
 
 /// Rotational stiffness \[N m/rad\].
 const STIFFNESS_NM_PER_RAD: f64 = 0.5;
-/// Angle of the turn \[rad\].
+/// Angle of the rotation \[rad\].
 const TURN_RAD: f64 = 0.4;
-/// Duration of the turn \[s\].
+/// Duration of the rotation \[s\].
 const TURN_S: f64 = 8.0;
 /// Duration of gravity hold before the trajectory \[s\].
 const SETTLE_S: f64 = 0.3;
-/// Start poses that are tried.
+/// Number of start poses that are tried.
 const CANDIDATES: u32 = 100;
-/// Points of a motion at which a start pose is judged.
+/// Number of points of a motion at which a start pose is evaluated.
 const PATH_POINTS: u32 = 64;
 
 /// Errors of the tip in the pose mode.
@@ -45,7 +45,7 @@ pub struct PoseTracking {
     pub max_rotation_rad: f64,
 }
 
-/// Tracks the sinusoid at 5 N/m and a turn of 0.4 rad about the vertical at 0.5 N m/rad, with every joint active.
+/// Tracks the sinusoid at 5 N/m and a rotation by 0.4 rad about the vertical at 0.5 N m/rad, with every joint active.
 ///
 /// # Errors
 /// [`ExperimentError::Refused`] if no start pose of the arm allows the motion; [`ExperimentError::Fault`].
@@ -107,14 +107,14 @@ pub fn track_pose<const N: usize>(
 pub struct PoseMotion {
     /// Trajectory of the position.
     pub trajectory: Trajectory,
-    /// Turn of the orientation.
+    /// Rotation of the orientation.
     pub rotation: Rotation,
     /// Duration \[s\].
     pub duration_s: f64,
 }
 
 impl PoseMotion {
-    /// The request of this motion.
+    /// Returns the request of this motion.
     pub fn request<const N: usize>(&self) -> Request<N> {
         Request::TrackPose {
             trajectory: self.trajectory,
@@ -123,8 +123,8 @@ impl PoseMotion {
     }
 }
 
-/// Of evenly spread poses with the tip at the start of the trajectory, the one whose motion is accepted and lets errors
-/// of the friction model disturb the tip least.
+/// Selects a start pose from evenly spread poses with the tip at the start of the trajectory: the controller accepts the motion
+/// from it, and errors of the friction model disturb the tip least.
 ///
 /// # Errors
 /// [`ExperimentError::Refused`] with the reason of the last pose if no pose allows the motion.
@@ -155,8 +155,9 @@ pub fn pose_start<const N: usize>(
     })
 }
 
-/// Force \[N\] on the tip to which the law's inverse maps the joints' dry friction, all joints together (root of the sum
-/// of squares), at its maximum along the motion; [`f64::MAX`] if the motion meets a singular pose. The joints move as the task's inverse moves them.
+/// Returns the maximum, along the motion, of the force on the tip to which the law's inverse maps the dry friction of all joints
+/// (root of the sum of squares) \[N\]; [`f64::MAX`] if the motion reaches a singular pose. The joints move as the task's inverse
+/// moves them.
 fn friction_at_tip_n<const N: usize>(
     config: &Config<N>,
     motion: &PoseMotion,

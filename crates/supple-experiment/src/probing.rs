@@ -34,20 +34,20 @@ pub struct Stroke {
     pub impact_newton_s: f64,
     /// Speed at which the tip leaves the block after the first impact, over `approach_m_per_s`.
     pub restitution: f64,
-    /// Integral over the same time as `impulse_newton_s`, from the first touch on, of the force that the spring asks
-    /// for: `K (X - Xo)` with the true tip, where it presses \[N s\].
+    /// Integral, over the time of `impulse_newton_s` from the first touch on, of the commanded spring force `K (X - Xo)` with the
+    /// true tip, where the force presses \[N s\].
     pub spring_impulse_newton_s: f64,
     /// Integral of the vertical force over the first 50 ms after the first touch \[N s\].
     pub impulse_first_50ms_newton_s: f64,
     /// Mean vertical force over the last 0.3 s of the way down \[N\]: while the reference slows down to rest, the
-    /// friction feed-forward falls to nothing. It is no force at rest; `pressing_force_n` is.
+    /// friction feed-forward decreases to zero. For the force at rest see `pressing_force_n`.
     pub rest_force_n: f64,
     /// Mean vertical force while pressing: over the last 0.5 s of the dwell, in which the reference rests at the
     /// bottom of the stroke \[N\]. Zero without a dwell.
     pub pressing_force_n: f64,
-    /// Mean vertical force that the spring asks for over the same time, `K (X - Xo)` with the true tip \[N\].
+    /// Mean commanded vertical spring force over the same time, `K (X - Xo)` with the true tip \[N\].
     pub spring_force_n: f64,
-    /// Time from the first touch until contact was detected \[s\]; `None` if it was not.
+    /// Time from the first touch until contact was detected \[s\]; `None` if contact was not detected.
     pub latched_after_s: Option<f64>,
 }
 
@@ -59,19 +59,19 @@ pub fn strokes<const N: usize>(plan: &Plan<N>) -> Result<Vec<Stroke>, Experiment
     let Trajectory::Probe(probe) = plan.trajectory else {
         return Ok(Vec::new());
     };
-    let mut meter = ContactMeter::new(probe);
+    let mut contact = ContactAccumulator::new(probe);
     run(plan, &mut |cycle, time_s| {
         if let Some(time_s) = time_s {
-            meter.cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
+            contact.add_cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
         }
         Ok(())
     })?;
-    Ok(meter.finish())
+    Ok(contact.finish())
 }
 
-/// Progress of the first impact of a stroke.
+/// Phase of the first impact of a stroke.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Impact {
+enum ImpactPhase {
     Before,
     Touching,
     /// The tip has left the block within the last cycle.
@@ -81,12 +81,12 @@ enum Impact {
 
 /// Collects strokes from the cycles of a run.
 #[derive(Debug)]
-pub struct ContactMeter {
+pub struct ContactAccumulator {
     probe: Probe,
     current: Option<((u32, u32), Stroke)>,
     first_touch_s: Option<f64>,
-    /// The first impact: before it, in it, just over, over.
-    impact: Impact,
+    /// Phase of the first impact.
+    impact: ImpactPhase,
     last_speed_m_per_s: f64,
     rest_n: Mean,
     pressing_n: Mean,
@@ -94,14 +94,14 @@ pub struct ContactMeter {
     finished: Vec<Stroke>,
 }
 
-impl ContactMeter {
-    /// Creates a meter for a probing cycle.
-    pub fn new(probe: Probe) -> ContactMeter {
-        ContactMeter {
+impl ContactAccumulator {
+    /// Creates an accumulator for a probing cycle.
+    pub fn new(probe: Probe) -> ContactAccumulator {
+        ContactAccumulator {
             probe,
             current: None,
             first_touch_s: None,
-            impact: Impact::Before,
+            impact: ImpactPhase::Before,
             last_speed_m_per_s: 0.0,
             rest_n: Mean::default(),
             pressing_n: Mean::default(),
@@ -112,7 +112,7 @@ impl ContactMeter {
 
     /// Adds one controller cycle. `time_s` is the time since the start of the trajectory, `truth` the plant's
     /// state at the start of the cycle, `output` the controller's answer.
-    pub fn cycle<const N: usize>(
+    pub fn add_cycle<const N: usize>(
         &mut self,
         time_s: f64,
         truth: &Truth<N>,
@@ -128,8 +128,8 @@ impl ContactMeter {
         let Some((_, record)) = &mut self.current else {
             return;
         };
-        if self.impact == Impact::Left {
-            self.impact = Impact::Over;
+        if self.impact == ImpactPhase::Left {
+            self.impact = ImpactPhase::Over;
             record.restitution = truth.tip_velocity_m_per_s.z / record.approach_m_per_s;
         }
         let pull_n = output.reference.map_or(0.0, |reference| {
@@ -147,20 +147,20 @@ impl ContactMeter {
             let force_n = step.force_n.z;
             if force_n > 0.0 && self.first_touch_s.is_none() {
                 self.first_touch_s = Some(step.time_s);
-                self.impact = Impact::Touching;
+                self.impact = ImpactPhase::Touching;
                 record.approach_m_per_s = self.last_speed_m_per_s;
             }
-            if self.impact == Impact::Touching {
+            if self.impact == ImpactPhase::Touching {
                 record.impact_newton_s += force_n * dt_s;
                 if force_n <= 0.0 {
-                    self.impact = Impact::Left;
+                    self.impact = ImpactPhase::Left;
                 }
             }
-            let counts = phase != ProbePhase::Dwell;
-            if counts {
+            let outside_dwell = phase != ProbePhase::Dwell;
+            if outside_dwell {
                 record.impulse_newton_s += force_n * dt_s;
             }
-            if counts && force_n > 0.0 {
+            if outside_dwell && force_n > 0.0 {
                 record.contact_s += dt_s;
             }
             if let Some(touch_s) = self.first_touch_s
@@ -191,17 +191,17 @@ impl ContactMeter {
             stroke.spring_force_n = core::mem::take(&mut self.spring_n).mean();
             self.finished.push(stroke);
         }
-        (self.first_touch_s, self.impact) = (None, Impact::Before);
+        (self.first_touch_s, self.impact) = (None, ImpactPhase::Before);
     }
 
-    /// All strokes, the unfinished last one included.
+    /// Returns all strokes, including the unfinished last one.
     pub fn finish(mut self) -> Vec<Stroke> {
         self.finish_stroke();
         self.finished
     }
 }
 
-/// Mass with which the tip meets a force along `direction`, a unit vector, at the pose `q`: `1 / (n' J H^-1 J' n)`
+/// Returns the effective mass of the tip along `direction`, a unit vector, at the pose `q`: `1 / (n' J H^-1 J' n)`
 /// \[kg\], for joints that are free to move. `None` if the pose is singular.
 pub fn effective_mass_kg<const N: usize>(
     arm: &Arm<N>,
@@ -213,7 +213,7 @@ pub fn effective_mass_kg<const N: usize>(
     (mobility > 0.0).then(|| 1.0 / mobility)
 }
 
-/// Median of each quantity over the strokes.
+/// Returns the median of each quantity over the strokes.
 pub fn median_stroke(strokes: &[Stroke]) -> Stroke {
     let median_of = |entry: &dyn Fn(&Stroke) -> f64| {
         let values: Vec<f64> = strokes.iter().map(entry).collect();

@@ -1,38 +1,40 @@
-//! Tracking error on each piece of the quadrant.
+//! Tracking error along each segment of the quadrant.
 
 use crate::metrics::Rms;
 use serde::Serialize;
-use supple_core::trajectory::{Piece, Quadrant};
+use supple_core::trajectory::{PathSegment, Quadrant};
 
-/// One pass along one piece.
+/// Tracking error of one pass along one segment.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Edge {
-    /// `out`, `ellipse` or `back`.
-    pub piece: &'static str,
-    /// Number of rounds completed before.
-    pub round: u32,
-    /// Whether the run starts here from rest, without a jump of the velocity.
+pub struct SegmentPass {
+    /// Name of the segment: `out`, `ellipse` or `back`.
+    #[serde(rename = "piece")]
+    pub segment: &'static str,
+    /// Number of laps completed before this pass.
+    #[serde(rename = "round")]
+    pub lap: u32,
+    /// Whether the pass starts from rest, without a velocity jump.
     pub from_rest: bool,
     /// Maximum error \[m\].
     pub peak_error_m: f64,
-    /// Mean error over the last quarter of the piece \[m\].
+    /// Mean error over the last quarter of the segment \[m\].
     pub last_quarter_error_m: f64,
 }
 
-/// Collects edges from the cycles of a run.
+/// Accumulates the tracking error of each segment pass over the cycles of a run.
 #[derive(Debug)]
-pub struct EdgeMeter {
+pub struct SegmentErrorAccumulator {
     quadrant: Quadrant,
-    current: Option<(Piece, u32)>,
+    current: Option<(PathSegment, u32)>,
     all: Rms,
     last_quarter: (f64, u32),
-    edges: Vec<Edge>,
+    edges: Vec<SegmentPass>,
 }
 
-impl EdgeMeter {
-    /// Creates a meter for a quadrant.
-    pub fn new(quadrant: Quadrant) -> EdgeMeter {
-        EdgeMeter {
+impl SegmentErrorAccumulator {
+    /// Creates an accumulator for a quadrant.
+    pub fn new(quadrant: Quadrant) -> SegmentErrorAccumulator {
+        SegmentErrorAccumulator {
             quadrant,
             current: None,
             all: Rms::default(),
@@ -41,12 +43,12 @@ impl EdgeMeter {
         }
     }
 
-    /// Adds one cycle: distance of the tip from its reference at `time_s`.
-    pub fn cycle(&mut self, time_s: f64, error_m: f64) {
-        let (piece, fraction, round) = self.quadrant.piece_at(time_s);
-        if self.current != Some((piece, round)) {
+    /// Adds the distance of the tip from its reference in the cycle at `time_s`.
+    pub fn add_cycle(&mut self, time_s: f64, error_m: f64) {
+        let (segment, fraction, lap) = self.quadrant.segment_at(time_s);
+        if self.current != Some((segment, lap)) {
             self.close();
-            self.current = Some((piece, round));
+            self.current = Some((segment, lap));
         }
         self.all.add(error_m);
         if fraction >= 0.75 {
@@ -56,17 +58,17 @@ impl EdgeMeter {
     }
 
     fn close(&mut self) {
-        if let Some((piece, round)) = self.current.take()
+        if let Some((segment, lap)) = self.current.take()
             && self.last_quarter.1 > 0
         {
-            self.edges.push(Edge {
-                piece: match piece {
-                    Piece::Out => "out",
-                    Piece::Ellipse => "ellipse",
-                    Piece::Back => "back",
+            self.edges.push(SegmentPass {
+                segment: match segment {
+                    PathSegment::Out => "out",
+                    PathSegment::Ellipse => "ellipse",
+                    PathSegment::Back => "back",
                 },
-                round,
-                from_rest: piece == Piece::Out && round == 0,
+                lap,
+                from_rest: segment == PathSegment::Out && lap == 0,
                 peak_error_m: self.all.max_abs(),
                 last_quarter_error_m: self.last_quarter.0 / f64::from(self.last_quarter.1),
             });
@@ -75,8 +77,8 @@ impl EdgeMeter {
         self.last_quarter = (0.0, 0);
     }
 
-    /// All edges of which the last quarter was reached.
-    pub fn finish(mut self) -> Vec<Edge> {
+    /// Returns all passes that reached the last quarter of their segment.
+    pub fn finish(mut self) -> Vec<SegmentPass> {
         self.close();
         self.edges
     }

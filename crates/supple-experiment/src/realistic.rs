@@ -1,4 +1,4 @@
-//! The headline of the demo: a controller on the plant `realistic`, calibrated and learning, cold and warmed up.
+//! The main result of the demo: a calibrated and learning controller on the plant `realistic`, cold and warmed up.
 
 use crate::effects::{FreeMotion, calibrated, free_motion, free_motion_at, result_or_error};
 use crate::error::ExperimentError;
@@ -8,17 +8,17 @@ use serde::Serialize;
 use supple_model::Description;
 use supple_plant::PlantOptions;
 
-/// Simulated time that one seed takes, about \[s\]; for progress.
+/// Approximate simulated time of one seed, for the display of progress \[s\].
 pub(crate) const REALISTIC_S: f64 = 580.0;
 /// The paper's lowest stiffness \[N/m\].
 const SOFT_N_PER_M: f64 = 0.5;
 /// Time of work after which the arm counts as warm \[s\].
 const WARM_S: f64 = 1200.0;
 
-/// Free motion at 5 N/m on the realistic plant, by seed, calibrated and learning: errors count after
+/// Free motion at 5 N/m on the realistic plant, by seed, calibrated and learning: errors are measured after
 /// [`crate::effects::LEARNING_S`] of motion.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Realistic {
+pub struct RealisticRuns {
     /// Root mean square tip error on the sinusoid, cold, by seed \[m\].
     pub sinusoid_rms_m: Vec<f64>,
     /// Root mean square tip error on the arc, cold, by seed \[m\].
@@ -42,7 +42,7 @@ pub struct Realistic {
     pub failed: Vec<SeedFailure>,
 }
 
-/// Why one seed has no result.
+/// Seed without a result, and the reason.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SeedFailure {
     /// The seed, counted from that of the demo.
@@ -86,8 +86,8 @@ impl RealisticSeed {
     }
 }
 
-/// Calibrates on the arm with `options` and tracks, cold and warm. With a `model`, that model is used instead. An arm that
-/// cannot be calibrated is a result.
+/// Calibrates on the arm with `options` and tracks, cold and warm. With a `model`, uses that model instead of a calibration. An
+/// arm that cannot be calibrated is a result.
 pub(crate) fn realistic_seed<const N: usize>(
     description: &Description,
     model: Option<&Description>,
@@ -135,8 +135,8 @@ fn tracked<const N: usize>(
     })
 }
 
-impl Realistic {
-    pub(crate) fn of(seeds: &[Result<RealisticSeed, String>]) -> Realistic {
+impl RealisticRuns {
+    pub(crate) fn of(seeds: &[Result<RealisticSeed, String>]) -> RealisticRuns {
         let done = || seeds.iter().filter_map(|seed| seed.as_ref().ok());
         let motions =
             done().flat_map(|seed| [&seed.learning.cold, &seed.learning.warm, &seed.soft]);
@@ -155,7 +155,7 @@ impl Realistic {
             }
         }
         let of = |error: fn(&RealisticSeed) -> f64| done().map(error).collect();
-        Realistic {
+        RealisticRuns {
             sinusoid_rms_m: of(|seed| seed.learning.cold.sinusoid_rms_m),
             arc_rms_m: of(|seed| seed.learning.cold.arc_rms_m),
             warm_rms_m: of(|seed| seed.learning.warm.sinusoid_rms_m),

@@ -17,7 +17,7 @@ pub struct Recorder<const N: usize> {
 }
 
 impl<const N: usize> Recorder<N> {
-    /// Creates the log of a plan; `notes` list what else belongs to it, such as the options of the plant.
+    /// Creates the log of a plan; `notes` contain other conditions of the run, such as the options of the plant.
     ///
     /// # Errors
     /// If the log cannot be written.
@@ -60,7 +60,7 @@ impl<const N: usize> Recorder<N> {
     ///
     /// # Errors
     /// If the log cannot be written.
-    pub fn cycle(&mut self, cycle: &Cycle<'_, N>) -> Result<(), LogError> {
+    pub fn write_cycle(&mut self, cycle: &Cycle<'_, N>) -> Result<(), LogError> {
         let truth = &cycle.truth;
         let extras = Extras {
             truth: Some(PlantTruth {

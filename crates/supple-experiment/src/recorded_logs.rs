@@ -19,11 +19,11 @@ pub fn log_of(recording: &Recording) -> Log {
 /// Preparation of the project's own logs: a command acts during the following cycle.
 pub fn preparation(period_s: f64, cutoff_hz: f64) -> Preparation {
     let kept_hz = 12.5 * cutoff_hz;
-    let keep_every = ((1.0 / period_s) / kept_hz).round().max(1.0) as usize;
+    let decimation_factor = ((1.0 / period_s) / kept_hz).round().max(1.0) as usize;
     Preparation {
         rate_hz: Some(1.0 / period_s),
         cutoff_hz: Some(cutoff_hz),
-        keep_every,
+        decimation_factor,
         torque_delay_s: 1.5 * period_s,
     }
 }

@@ -1,4 +1,4 @@
-//! A sequence of requests without a tip trajectory, as identification needs it.
+//! A sequence of requests without a tip trajectory, for identification.
 
 use crate::error::ExperimentError;
 use crate::record::Recorder;
@@ -87,7 +87,7 @@ impl<const N: usize> RequestSequence<N> {
         self.record_with_notes(folder, description, seed, BTreeMap::new())
     }
 
-    /// As [`RequestSequence::record`], with notes in the log, such as [`PlantOptions::notes`].
+    /// Does the same as [`RequestSequence::record`], with notes in the log, such as [`PlantOptions::notes`].
     ///
     /// # Errors
     /// As [`RequestSequence::record`].
@@ -105,7 +105,7 @@ impl<const N: usize> RequestSequence<N> {
         };
         let mut recorder =
             Recorder::named(folder, description, &self.name, &self.config, seed, notes)?;
-        let recordings = self.perform(&mut |cycle, _| Ok(recorder.cycle(cycle)?))?;
+        let recordings = self.perform(&mut |cycle, _| Ok(recorder.write_cycle(cycle)?))?;
         recorder.finish()?;
         Ok(recordings)
     }

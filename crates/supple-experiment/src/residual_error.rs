@@ -1,14 +1,14 @@
-//! Tracking error that the torques of a motion imply which a controller's feed-forward leaves.
+//! Tracking error that follows from the torques that a controller's feed-forward leaves in a motion.
 //!
-//! A controller whose feed-forward is wrong by `r` lets the tip deviate until the stiffness holds the difference: by `F / K`
-//! with the force `F` at the tip that has the torques `J' F = r` at the joints that move the tip. Which residuals count depends
-//! on what the arm does later: those of the fast motion that excites an arm come from its elasticity and inertia, those near a
-//! reversal from friction that has not turned round yet, and neither acts in a slow motion elsewhere. So the residuals are
+//! If the feed-forward has the error `r`, the tip deviates until the stiffness balances the error: by `F / K`
+//! with the force `F` at the tip that has the torques `J' F = r` at the joints that move the tip. The relevant residuals depend
+//! on the later motion: residuals of the fast excitation come from elasticity and inertia, residuals near a reversal from
+//! friction that has not reversed yet, and neither acts in a slow motion elsewhere. So the residuals are
 //! averaged over the samples in which the arm is near the poses and speeds of the sinusoid, and a joint slides, separately for
 //! both directions: noise averages out, errors of gravity and friction stay.
 //!
-//! The factor to the upper bound is that which covers nine tenths of the calibrations of simulated arms with random effects
-//! of real ones (`docs/verdict.md`).
+//! The factor of the upper bound covers nine tenths of the calibrations of simulated arms with random effects
+//! of real arms (`docs/verdict.md`).
 
 use crate::tracking_prediction::GOOD_M;
 use nalgebra::DMatrix;
@@ -20,24 +20,25 @@ use supple_ident::{Motion, feedforward_nm};
 use supple_model::reach::{REACH_CHECK_STEP_S, active_joints, follow, start_pose};
 use supple_model::{Description, ModelError};
 
-/// Distance from the poses of the sinusoid, and of a speed beyond its speeds, at which a sample counts 0.6 times.
+/// Distance from the poses of the sinusoid, and distance from its speeds, at which a sample has the weight 0.6.
 const NEAR_RAD: f64 = 0.4;
 const NEAR_RAD_PER_S: f64 = 0.2;
-/// Time that the samples of each direction must represent \[s\]; the distances grow by this factor, up to a limit, until they do.
+/// Time that the samples of each direction must represent \[s\]; the distances grow by this factor, up to a limit, until the
+/// samples represent this time.
 const MIN_TIME_S: f64 = 0.6;
 const DISTANCE_GROWTH: f64 = 1.3;
 const MAX_DISTANCE_FACTOR: f64 = 20.0;
-/// Speed, and travel since the last reversal, above which a joint slides.
+/// Speed, and distance since the last reversal, above which a joint slides.
 const SLIDING_RAD_PER_S: f64 = 0.06;
 const SLIDING_RAD: f64 = 0.03;
 /// Fraction of the force at the tip of all dry friction that the feed-forward leaves at reversals even with an exact model: 3 mm
 /// at 5 N/m on the WAM.
 const REVERSAL_SHARE: f64 = 0.004;
-/// Upper and lower bound over the estimate; the error at reversals is added to the upper one, as squares.
+/// Upper and lower bound relative to the estimate; the error at reversals is added to the upper bound, as squares.
 const UPPER_FACTOR: f64 = 1.2;
 const LOWER_FACTOR: f64 = 0.1;
 
-/// What is said where there is no interval.
+/// Message if there is no interval.
 pub const NO_INTERVAL: &str = "no interval at 5 N/m: a joint that moves the tip was not identified or slides too little in the logs that \
                                were not fitted, or the sinusoid is out of reach";
 
@@ -50,12 +51,12 @@ pub struct ErrorInterval {
     pub upper_m: f64,
     /// Log and joint that contribute most: index of the log, joint.
     pub worst: (usize, usize),
-    /// Residual of each moving joint that counts, in the worst log \[N m\].
+    /// Residual of each identified joint that moves the tip, in the worst log \[N m\].
     pub residual_nm: Vec<f64>,
 }
 
 impl ErrorInterval {
-    /// What the model is good for, in words; `joint` names the joint that contributes most.
+    /// Returns in words whether the model is suitable for a stiffness; `joint` names the joint that contributes most.
     pub fn verdict(&self, stiffness_n_per_m: f64, joint: &str) -> String {
         let good = match self.upper_m <= GOOD_M {
             true => "good",
@@ -84,7 +85,7 @@ pub struct SinusoidRegion<const N: usize> {
 }
 
 impl<const N: usize> SinusoidRegion<N> {
-    /// Of this arm; `None` if it cannot reach the sinusoid or no joint moves the tip.
+    /// Creates the region of this arm; `None` if the arm cannot reach the sinusoid or no joint moves the tip.
     ///
     /// # Errors
     /// If the description does not fit `N` joints.
@@ -130,7 +131,7 @@ impl<const N: usize> SinusoidRegion<N> {
         })
     }
 
-    /// Square of the distance of a sample from the region, one for [`NEAR_RAD`] and [`NEAR_RAD_PER_S`].
+    /// Returns the squared distance of a sample from the region, in units of [`NEAR_RAD`] and [`NEAR_RAD_PER_S`].
     fn squared_distance(&self, motion: &Motion, sample: usize) -> f64 {
         let beyond =
             |value: f64, lower: f64, upper: f64| (lower - value).max(value - upper).max(0.0);
@@ -144,9 +145,9 @@ impl<const N: usize> SinusoidRegion<N> {
     }
 }
 
-/// Residual of a joint in a motion that counts near the sinusoid \[N m\]: of the means of both directions, their mean and half
-/// their difference, which friction makes, as squares. `None` if the joint does not slide in both directions for
-/// [`MIN_TIME_S`].
+/// Returns the residual of a joint near the sinusoid \[N m\]: the root of the sum of two squares, of the mean of the mean
+/// residuals of both directions, and of half their difference, which friction causes. `None` if the joint does not slide in both
+/// directions for [`MIN_TIME_S`].
 fn residual_nm(
     motion: &Motion,
     squared_distance: &[f64],
@@ -175,7 +176,7 @@ fn residual_nm(
     }
 }
 
-/// Whether a joint slides, for each sample, and its torque is used.
+/// Returns for each sample whether a joint slides and its torque is used.
 fn sliding(motion: &Motion, joint: usize) -> Vec<bool> {
     let (mut travel_rad, mut forward) = (0.0, None);
     let slides = |i: usize| {
@@ -189,19 +190,20 @@ fn sliding(motion: &Motion, joint: usize) -> Vec<bool> {
     (0..motion.samples()).map(slides).collect()
 }
 
-/// The interval of the tracking error of the sinusoid at a stiffness, from motions and what the feed-forward leaves of their
-/// torques, (samples, moving joints); the worst motion decides. `None` without motions, if not all joints that move the tip are
-/// among `moving`, or if there is no motion in which each of them slides in both directions for some time.
+/// Returns the interval of the tracking error of the sinusoid at a stiffness, from motions and the torques that the feed-forward
+/// leaves in them, (samples, identified joints); the worst motion decides. `None` without motions, if not all joints that move
+/// the tip are among `identified_joints`, or if there is no motion in which each of these joints slides in both directions for
+/// some time.
 pub fn error_interval<const N: usize>(
     region: &SinusoidRegion<N>,
-    moving: &[usize],
+    identified_joints: &[usize],
     held_out: &[(&Motion, &DMatrix<f64>)],
     stiffness_n_per_m: f64,
 ) -> Option<ErrorInterval> {
     let rows: Option<Vec<usize>> = region
         .active
         .iter()
-        .map(|joint| moving.iter().position(|j| j == joint))
+        .map(|joint| identified_joints.iter().position(|j| j == joint))
         .collect();
     let rows = rows?;
     let mut worst: Option<ErrorInterval> = None;
@@ -217,7 +219,7 @@ pub fn error_interval<const N: usize>(
         let Some(found) = found else {
             continue;
         };
-        let mut residual_nm = vec![0.0; moving.len()];
+        let mut residual_nm = vec![0.0; identified_joints.len()];
         let mut parts = Vec::new();
         for (i, &row) in rows.iter().enumerate() {
             residual_nm[row] = found[i];
@@ -240,14 +242,14 @@ pub fn error_interval<const N: usize>(
     worst
 }
 
-/// The interval of the tracking error of the sinusoid at a stiffness for a controller with this model, from motions that were
-/// not fitted. As [`error_interval`]; `None` also if the arm cannot reach the sinusoid.
+/// Returns the interval of the tracking error of the sinusoid at a stiffness for a controller with this model, from motions that
+/// were not fitted, as [`error_interval`] does; `None` also if the arm cannot reach the sinusoid.
 ///
 /// # Errors
 /// If the description does not fit `N` joints.
 pub fn error_interval_of<const N: usize>(
     identified: &Description,
-    moving: &[usize],
+    identified_joints: &[usize],
     held_out: &[&Motion],
     stiffness_n_per_m: f64,
 ) -> Result<Option<ErrorInterval>, ModelError> {
@@ -255,21 +257,26 @@ pub fn error_interval_of<const N: usize>(
         return Ok(None);
     };
     let config = identified.config::<N>()?;
-    let residual = |motion: &&Motion| feedforward_residual_nm(&config, moving, motion);
+    let residual = |motion: &&Motion| feedforward_residual_nm(&config, identified_joints, motion);
     let residuals: Vec<_> = held_out.iter().map(residual).collect();
     let pairs: Vec<_> = held_out.iter().copied().zip(&residuals).collect();
-    Ok(error_interval(&region, moving, &pairs, stiffness_n_per_m))
+    Ok(error_interval(
+        &region,
+        identified_joints,
+        &pairs,
+        stiffness_n_per_m,
+    ))
 }
 
-/// Torques of the joints `moving` in a motion beyond the feed-forward of a controller with the configuration `config`, (samples,
-/// moving joints) \[N m\].
+/// Returns the torques of `identified_joints` in a motion beyond the feed-forward of a controller with the configuration
+/// `config`, (samples, identified joints) \[N m\].
 pub fn feedforward_residual_nm<const N: usize>(
     config: &Config<N>,
-    moving: &[usize],
+    identified_joints: &[usize],
     motion: &Motion,
 ) -> DMatrix<f64> {
     let feedforward = feedforward_nm(config, motion);
-    DMatrix::from_fn(motion.samples(), moving.len(), |sample, row| {
-        motion.tau[(sample, moving[row])] - feedforward[(sample, moving[row])]
+    DMatrix::from_fn(motion.samples(), identified_joints.len(), |sample, row| {
+        motion.tau[(sample, identified_joints[row])] - feedforward[(sample, identified_joints[row])]
     })
 }

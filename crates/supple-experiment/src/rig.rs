@@ -17,7 +17,7 @@ pub struct Rig<const N: usize> {
     /// torque off.
     active: bool,
     learner: Option<Learner<N>>,
-    /// What the learner wants to bring into force.
+    /// Learned parameters that the controller has not applied yet.
     scheduled: VecDeque<Scheduled<N>>,
     steps: u64,
     wiring: Wiring<N>,
@@ -55,18 +55,18 @@ impl<const N: usize> Rig<N> {
             learner: None,
             scheduled: VecDeque::new(),
             steps: 0,
-            wiring: Wiring::RIGHT,
+            wiring: Wiring::AS_DESCRIBED,
         })
     }
 
-    /// Connects encoders and motors wrongly.
+    /// Sets the connections of encoders and motors.
     #[must_use]
     pub fn with_wiring(self, wiring: Wiring<N>) -> Rig<N> {
         Rig { wiring, ..self }
     }
 
-    /// Replaces the controller by an idle one, as a restart of its process does; the arm stays where it is. A learner
-    /// begins anew.
+    /// Replaces the controller by an idle one, as a restart of its process does; the arm stays in its pose. The learner
+    /// is reset.
     pub fn replace_controller(&mut self, controller: Controller<N>) {
         self.state = State::new(&controller);
         self.learner = self
@@ -78,7 +78,7 @@ impl<const N: usize> Rig<N> {
         (self.active, self.steps) = (false, 0);
     }
 
-    /// Adds a learner. It learns once learning is requested, as in `supple-rt`.
+    /// Adds a learner, which learns after a request to learn, as in `supple-rt`.
     #[must_use]
     pub fn with_learner(self) -> Rig<N> {
         Rig {
@@ -87,22 +87,23 @@ impl<const N: usize> Rig<N> {
         }
     }
 
-    /// The learner's estimates, if there is one.
+    /// Returns the learner's estimates, if there is a learner.
     pub fn report(&self) -> Option<Report<N>> {
         self.learner.as_ref().map(Learner::report)
     }
 
-    /// The controller.
+    /// Returns the controller.
     pub fn controller(&self) -> &Controller<N> {
         &self.controller
     }
 
-    /// The plant in its present state.
+    /// Returns the plant in its present state.
     pub fn plant(&self) -> &Plant<N> {
         &self.plant
     }
 
-    /// Runs one cycle: measure, step the controller, actuate. What is learned enters in a cycle without a request.
+    /// Runs one cycle: measures, steps the controller, actuates. The controller applies learned parameters in a cycle without a
+    /// request.
     pub fn cycle(&mut self, request: Option<Request<N>>) -> Cycle<'_, N> {
         let measurement = *self.plant.measurement();
         let truth = *self.plant.truth();
@@ -128,7 +129,7 @@ impl<const N: usize> Rig<N> {
         }
         self.steps += 1;
         self.active = !output.torque_off && (self.active || output.mode == Mode::GravityHold);
-        self.plant.see_controller(ControllerView {
+        self.plant.set_controller_view(ControllerView {
             active: self.active,
             mode: Some(output.mode),
         });

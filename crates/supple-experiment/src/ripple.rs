@@ -13,7 +13,7 @@ use supple_ident::{
 };
 use supple_plant::PlantConfig;
 
-/// Ripple tables of all motors, identified with a controller of configuration `start` on a plant that starts at
+/// Identifies the ripple tables of all motors with a controller of configuration `start` on a plant that starts at
 /// rest at `home_rad`.
 ///
 /// # Errors

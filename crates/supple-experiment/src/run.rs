@@ -71,7 +71,7 @@ pub struct Run {
 }
 
 impl Run {
-    /// A run that was left out: no samples, and errors that are not numbers.
+    /// Returns the result of a run that was left out: no samples, and errors that are not numbers.
     pub(crate) fn left_out(name: String) -> Run {
         Run {
             name,
@@ -84,24 +84,24 @@ impl Run {
         }
     }
 
-    /// Whether it has no samples: it was left out, or a fault ended it in its first cycle.
+    /// Returns whether the run has no samples: the demo left it out, or a fault ended it in its first cycle.
     pub fn is_left_out(&self) -> bool {
         self.trace.samples.is_empty()
     }
 }
 
-/// Called after every cycle of a run with the time since the start of the trajectory \[s\], `None` before it and after a fault.
-/// An error ends the run.
+/// Function that [`run()`] calls after every cycle with the time since the start of the trajectory \[s\], `None` before the
+/// trajectory and after a fault. An error of the function ends the run.
 pub type CycleCallback<'a, const N: usize> =
     dyn FnMut(&Cycle<'_, N>, Option<f64>) -> Result<(), ExperimentError> + 'a;
 
-/// Runs a plan. `watch` is called after every cycle, see [`CycleCallback`].
+/// Runs a plan and calls `on_cycle` after every cycle, see [`CycleCallback`].
 ///
 /// # Errors
 /// [`ExperimentError`]; a fault during the trajectory is a result, see [`Run::ended`].
 pub fn run<const N: usize>(
     plan: &Plan<N>,
-    watch: &mut CycleCallback<'_, N>,
+    on_cycle: &mut CycleCallback<'_, N>,
 ) -> Result<Run, ExperimentError> {
     let controller = Controller::new(plan.config)?;
     let config = &plan.config;
@@ -149,7 +149,7 @@ pub fn run<const N: usize>(
         }
         let tracking = matches!(output.mode, Mode::Track | Mode::Probe);
         let time_s = tracking.then_some(output.mode_time_s);
-        watch(&cycle, time_s)?;
+        on_cycle(&cycle, time_s)?;
         if let (Some(fault), None) = (output.fault, &ended) {
             if k < track_at {
                 return Err(ExperimentError::FaultAtStart {
@@ -188,7 +188,7 @@ pub fn run<const N: usize>(
         }
         k += 1;
     }
-    // A fault in the first cycle leaves no error, which is not a perfect run.
+    // After a fault in the first cycle there is no error value, which must not appear as an error of zero.
     let (rms_m, max_m) = match error.is_empty() {
         true => (f64::NAN, f64::NAN),
         false => (error.rms(), error.max_abs()),
@@ -209,19 +209,19 @@ pub fn run<const N: usize>(
     })
 }
 
-/// A joint as messages call it.
+/// Returns the label of a joint in messages.
 pub(crate) fn joint_label<const N: usize>(config: &Config<N>, joint: usize) -> String {
     JointLabel::new(joint, config.joint_names.as_slice()).to_string()
 }
 
-/// A fault or a refusal in words, with the names of the joints.
+/// Returns a fault or a refusal in words, with the names of the joints.
 pub(crate) fn in_words<const N: usize>(config: &Config<N>, message: &impl NamesJoints) -> String {
     message
         .with_names(config.joint_names.as_slice())
         .to_string()
 }
 
-/// A pose slightly off `start`, so that the initial move is not trivial: each active joint is rotated in the
+/// Returns a pose near `start`, so that the initial move has a distance: each active joint is rotated in the
 /// direction that lifts the tip away from obstacles below.
 fn offset_pose<const N: usize>(config: &Config<N>, start: &Vector<N>) -> Vector<N> {
     let limits = &config.limits;

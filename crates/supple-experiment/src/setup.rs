@@ -27,7 +27,7 @@ pub struct Variant {
 
 impl Variant {
     /// The unperturbed model, Stribeck feed-forward, load-dependent friction in the
-    /// plant, fade on.
+    /// plant, and fading of the friction feed-forward in contact.
     pub const EXACT: Variant = Variant {
         mismatch: None,
         stribeck: true,
@@ -42,15 +42,15 @@ impl Variant {
 pub struct Setup<const N: usize> {
     exact: Config<N>,
     plant: PlantConfig<N>,
-    /// Friction of the plant without options, which a model without them has.
+    /// Friction of the plant without options, which is the friction of a model identified without options.
     described_friction: [LuGre; N],
-    /// Whether `exact` is an identified model, whose Stribeck effect is its own.
+    /// Whether `exact` is an identified model, which has its own Stribeck effect.
     identified: bool,
     paths: Paths,
 }
 
 impl<const N: usize> Setup<N> {
-    /// Plant of one description with a controller whose model is another.
+    /// Creates the plant of one description with a controller whose model is another description.
     ///
     /// # Errors
     /// If one of the descriptions does not have `N` joints.
@@ -65,8 +65,8 @@ impl<const N: usize> Setup<N> {
         Ok(setup)
     }
 
-    /// Plant and controller of one description. If its friction has no Stribeck effect, the plant's breakaway
-    /// torque is still 10 % above Coulomb friction.
+    /// Creates plant and controller of one description. If its friction has no Stribeck effect, the plant's breakaway
+    /// torque is nevertheless 10 % above Coulomb friction.
     ///
     /// # Errors
     /// If the description does not have `N` joints.
@@ -84,7 +84,7 @@ impl<const N: usize> Setup<N> {
         })
     }
 
-    /// The same with effects of a real arm in the plant; the controller's model does not change.
+    /// Adds effects of a real arm to the plant; the controller's model does not change.
     ///
     /// # Errors
     /// If the options do not fit the arm.
@@ -93,23 +93,23 @@ impl<const N: usize> Setup<N> {
         Ok(self)
     }
 
-    /// Place and size of the trajectories.
+    /// Returns place and size of the trajectories.
     pub fn paths(&self) -> Paths {
         self.paths
     }
 
-    /// The same with the trajectories at another place or of another size.
+    /// Sets place and size of the trajectories.
     #[must_use]
     pub fn with_paths(self, paths: Paths) -> Self {
         Setup { paths, ..self }
     }
 
-    /// Radius of the cap \[m\].
+    /// Returns the radius of the cap \[m\].
     pub fn tip_radius_m(&self) -> f64 {
         self.plant.tip_radius_m
     }
 
-    /// The controller's configuration for a variant.
+    /// Returns the controller's configuration for a variant.
     ///
     /// # Errors
     /// If the mismatch makes the arm physically inconsistent.
@@ -137,7 +137,7 @@ impl<const N: usize> Setup<N> {
         Ok(config)
     }
 
-    /// The plant for a variant, with a scene.
+    /// Returns the plant for a variant, with a scene.
     pub fn plant(&self, variant: &Variant, scene: Scene) -> PlantConfig<N> {
         let mut plant = self.plant.clone();
         if !variant.load {

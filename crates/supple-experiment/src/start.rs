@@ -7,7 +7,7 @@ use supple_model::reach;
 pub use supple_model::reach::active_joints;
 pub(crate) use supple_model::reach::spread_poses;
 
-/// Joint angles that put the tip at the start of the trajectory, see [`reach::start_pose`].
+/// Returns joint angles with the tip at the start of the trajectory, see [`reach::start_pose`].
 ///
 /// # Errors
 /// [`ExperimentError::BeyondJointStop`] names the first point out of reach.

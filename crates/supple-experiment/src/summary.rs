@@ -3,8 +3,8 @@
 use crate::adapted::Adapted;
 use crate::metrics::LineFit;
 use crate::probing::Stroke;
-use crate::quadrant::Edge;
-use crate::realistic::Realistic;
+use crate::quadrant::SegmentPass;
+use crate::realistic::RealisticRuns;
 use crate::run::FaultEnd;
 use crate::trace::JointTorque;
 use serde::Serialize;
@@ -25,7 +25,7 @@ pub struct TrackingError {
 
 /// Tracking error at one speed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct AtSpeed {
+pub struct TrackingAtSpeed {
     /// Speed relative to the paper's.
     pub speed: f64,
     /// Tracking error at this speed.
@@ -45,13 +45,13 @@ pub struct TorqueRms {
 /// Results of the quadrant.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct QuadrantSummary {
-    /// Speed on every piece \[m/s\].
+    /// Speed on every segment of the path \[m/s\].
     pub speed_m_per_s: f64,
     /// Tracking error of the whole run.
     #[serde(flatten)]
     pub tracking: TrackingError,
-    /// Tracking error on each piece.
-    pub edges: Vec<Edge>,
+    /// Tracking error on each segment.
+    pub edges: Vec<SegmentPass>,
 }
 
 /// Probing at one stiffness: medians over the strokes.
@@ -61,7 +61,7 @@ pub struct ProbingSummary {
     pub stiffness_n_per_m: f64,
     /// `B` \[N s/m\].
     pub damping_n_s_per_m: f64,
-    /// Mass with which the plant's tip meets the block, at the pose of the first touch and with all joints free
+    /// Effective mass of the plant's tip at the pose of the first touch, with all joints free
     /// \[kg\]; zero at a singular pose.
     pub effective_mass_kg: f64,
     /// `m v (1 + e)`: impulse of an impact of that mass at `approach_m_per_s` with `restitution` \[N s\].
@@ -91,8 +91,8 @@ pub struct ImpulseSlope {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ContactStatistics {
     /// Line of impulse against stiffness \[N s per N/m; N s\]; `None` if the runs do not determine a line. The
-    /// impulse is curved over the stiffness: the intercept is neither the impact nor the impulse at low stiffness,
-    /// which the runs have.
+    /// impulse is not linear in the stiffness, so the intercept is neither the impact nor the impulse at low stiffness;
+    /// for these see the single runs.
     pub impulse_fit: Option<LineFit>,
     /// The curve: slope of the impulse from each stiffness to the next, over all runs.
     pub impulse_slopes: Vec<ImpulseSlope>,
@@ -131,11 +131,11 @@ pub struct Summary {
     /// Sinusoid and arc on the realistic plant, or on that of `plant` if it has options, with a model calibrated on the
     /// same arm; absent if these runs were left out.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub realistic: Option<Realistic>,
+    pub realistic: Option<RealisticRuns>,
     /// Figure 3a.
     pub sinusoid: TrackingError,
     /// Figure 3a at half, once and twice the paper's speed.
-    pub sinusoid_by_speed: Vec<AtSpeed>,
+    pub sinusoid_by_speed: Vec<TrackingAtSpeed>,
     /// An arc about the base axis, which moves the base joint.
     pub arc: TrackingError,
     /// Figure 4.
@@ -176,12 +176,13 @@ pub struct Summary {
     pub perturbed_rms_m: Vec<f64>,
     /// The same runs with their maximum errors and faults.
     pub perturbed_runs: Vec<TrackingError>,
-    /// Runs that the arm cannot perform at the size of its paths, with the size at which it can, or left out: their errors
-    /// are `null`, and probing runs are not in their list. Only for arms whose settings are derived from the URDF.
+    /// Runs that the arm cannot perform at the size of its paths, with the size at which it performed them. Runs without a size
+    /// were left out: their errors are `null`, and probing runs are missing in their list. Only for arms whose settings are
+    /// derived from the URDF.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub adapted: Vec<Adapted>,
-    /// For such an arm: its weight at the tip and the error that it allows. Faults on the realistic plant are results of
-    /// it and no failures.
+    /// For such an arm: its weight at the tip and the allowed error. A fault of such an arm on the realistic plant is a result
+    /// and not a failure.
     #[serde(flatten, skip_serializing_if = "Option::is_none")]
     pub derived: Option<DerivedArm>,
 }

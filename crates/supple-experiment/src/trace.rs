@@ -18,7 +18,7 @@ pub struct JointTorque {
 }
 
 impl JointTorque {
-    /// Torque terms of joint `i`.
+    /// Returns the torque terms of joint `i`.
     pub fn of<const N: usize>(output: &Output<N>, i: usize) -> JointTorque {
         let t = &output.torques;
         JointTorque {

@@ -17,7 +17,7 @@ pub struct IdentifiedModelTracking {
 }
 
 /// Tracks the sinusoid with a controller configured from `identified`; `None` if the arm cannot reach the sinusoid.
-/// If a fault ends a run early, the tracking error is that of the part before it.
+/// If a fault ends a run early, the tracking error is measured before the fault.
 ///
 /// # Errors
 /// [`ExperimentError`].

@@ -2,7 +2,8 @@
 //! whose models are drawn from the uncertainty of the fit.
 //!
 //! The prediction includes log noise and friction that depends on load and direction as in every simulated arm, but no
-//! other effects: what a model has learned and its compliance are left out on both sides. Expect larger errors on a real arm, as `docs/effects.md` shows effect by effect.
+//! other effects: learned parameters and compliance are left out in plant and controller. Expect larger errors on a real arm, as
+//! `docs/effects.md` shows effect by effect.
 
 use crate::error::ExperimentError;
 use crate::metrics::median;
@@ -27,12 +28,12 @@ pub struct TrackingPrediction {
     pub worst_m: Option<f64>,
     /// Number of draws that ended in a fault.
     pub faults: usize,
-    /// Why trial runs failed or ended early, each reason once.
+    /// Reasons why trial runs failed or ended early, each reason once.
     pub reasons: Vec<String>,
 }
 
-/// Draws `draws` models and tracks the sinusoid with each; `None` if the arm cannot reach it. A trial run that cannot be
-/// is a reason in the result, never an error.
+/// Draws `draws` models and tracks the sinusoid with each; `None` if the arm cannot reach the sinusoid. The result contains the
+/// reason why a trial run is impossible; this is not an error.
 ///
 /// # Errors
 /// [`ExperimentError`] for a description that is not one of `N` joints.
@@ -60,10 +61,10 @@ pub fn predict_tracking_error<const N: usize>(
         };
         let mut config = identified.config::<N>()?;
         config.arm = arm;
-        // The simulated plant of a description has neither what they compensate.
+        // The simulated plant of a description has none of the effects that these parameters compensate.
         config.learned = LearnedTerms::zero();
         config.compliance_rad_per_nm = Vector::zeros();
-        for joint in fit.columns.moving() {
+        for joint in fit.columns.identified_joints() {
             config.friction[*joint] = friction[*joint];
         }
         config.law.gains = scenario::gains_like(&config.law.gains, scenario::STIFFNESS_N_PER_M);
@@ -96,7 +97,7 @@ pub fn predict_tracking_error<const N: usize>(
 }
 
 impl TrackingPrediction {
-    /// Verdict as text.
+    /// Returns the verdict as text.
     pub fn verdict(&self) -> String {
         let mm = |m: f64| format!("{:.1} mm", 1e3 * m);
         let reasons = self.reasons.join("; ");

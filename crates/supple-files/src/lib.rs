@@ -68,7 +68,7 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), Error> {
         .and_then(|()| file.sync_all())
         .and_then(|()| std::fs::rename(&part, path));
     if written.is_err() {
-        // The earlier error is the one to report.
+        // The caller needs the earlier error.
         let _ = std::fs::remove_file(&part);
     }
     written
@@ -117,7 +117,7 @@ pub fn read_text(path: &Path, max_bytes: u64) -> Result<String, Error> {
 /// Characters of a value that a message quotes.
 pub const EXCERPT_CHARACTERS: usize = 80;
 
-/// A value of a file as a message quotes it: at most its first [`EXCERPT_CHARACTERS`] characters, and then its length.
+/// Returns a value of a file for quotation in a message: at most its first [`EXCERPT_CHARACTERS`] characters, then its length.
 pub fn excerpt(value: &str) -> Cow<'_, str> {
     match value.char_indices().nth(EXCERPT_CHARACTERS) {
         None => value.into(),
@@ -128,7 +128,7 @@ pub fn excerpt(value: &str) -> Cow<'_, str> {
     }
 }
 
-/// `path` with `suffix` appended to its file name: `run.mcap.part`.
+/// Returns `path` with `suffix` appended to its file name: `run.mcap.part`.
 pub fn with_suffix(path: &Path, suffix: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(suffix);

@@ -30,7 +30,7 @@ impl From<Arc<AtomicBool>> for Cancellation {
     }
 }
 
-/// The flag is not part of what is asked: options that differ in it alone are equal.
+/// The flag is not part of the options: options that differ only in the flag are equal.
 impl PartialEq for Cancellation {
     fn eq(&self, _: &Cancellation) -> bool {
         true

@@ -8,8 +8,8 @@
 //! ```
 //!
 //! `p` is the parabola of [`supple_core::friction`]. The dry friction of a gear grows with a torque
-//! `g_j`: that which joint j carries, by the nominal model, or that of the motor. A coupled motor turns with the sum of two
-//! joints; its torque acts on both.
+//! `g_j`: the load torque of joint j according to the nominal model, or the motor's torque. A coupled motor turns with the sum of
+//! two joint angles; its torque acts on both joints.
 
 use crate::effects::Effects;
 use crate::error::{IdentError, positive, shape_error};
@@ -21,7 +21,7 @@ pub const LINK_NAMES: [&str; 10] = [
     "m", "mcx", "mcy", "mcz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz",
 ];
 
-/// Friction columns of every moving joint.
+/// Friction columns of every identified joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrictionColumns {
     /// `V`.
@@ -109,7 +109,7 @@ pub enum Column {
 }
 
 impl Column {
-    /// Whether the column is discontinuous at a reversal of motion.
+    /// Returns whether the column is discontinuous at a reversal of motion.
     pub fn discontinuous_at_reversal(&self) -> bool {
         matches!(
             self,
@@ -126,26 +126,26 @@ impl Column {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Columns {
     dof: usize,
-    moving: Vec<usize>,
+    identified_joints: Vec<usize>,
     friction: FrictionColumns,
     effects: Effects,
     columns: Vec<Column>,
 }
 
 impl Columns {
-    /// Ten for each of `dof` links, then rotor inertia and `friction` of each of the `moving` joints,
-    /// then three for each pair of `couplings`.
+    /// Creates ten columns for each of `dof` links, then rotor inertia and `friction` of each identified joint,
+    /// then three columns for each pair of `couplings`.
     ///
     /// # Errors
     /// Invalid joints; a band or Stribeck speed that is not positive.
     pub fn new(
         dof: usize,
-        moving: &[usize],
+        identified_joints: &[usize],
         rotor: bool,
         friction: FrictionColumns,
         couplings: &[(usize, usize)],
     ) -> Result<Self, IdentError> {
-        crate::log::check_moving(dof, moving)?;
+        crate::log::check_joint_list(dof, identified_joints)?;
         positive("band_rad_per_s", friction.band_rad_per_s)?;
         if let Some(speed) = friction.stribeck_rad_per_s {
             positive("stribeck_rad_per_s", speed)?;
@@ -172,7 +172,7 @@ impl Columns {
         for link in 0..dof {
             columns.extend((0..10).map(|entry| Column::Link { link, entry }));
         }
-        for &joint in moving {
+        for &joint in identified_joints {
             let wanted = [
                 (rotor, Column::Rotor(joint)),
                 (friction.viscous, Column::Viscous(joint)),
@@ -193,8 +193,8 @@ impl Columns {
             );
         }
         for &(a, b) in couplings {
-            if a == b || !moving.contains(&a) || !moving.contains(&b) {
-                let expected = format!("two of the moving joints {moving:?}");
+            if a == b || !identified_joints.contains(&a) || !identified_joints.contains(&b) {
+                let expected = format!("two of the moving joints {identified_joints:?}");
                 return Err(shape_error("coupling", expected, format!("({a}, {b})")));
             }
             columns.extend([
@@ -205,17 +205,18 @@ impl Columns {
         }
         Ok(Self {
             dof,
-            moving: moving.to_vec(),
+            identified_joints: identified_joints.to_vec(),
             friction,
             effects: Effects::default(),
             columns,
         })
     }
 
-    /// The same with the columns of other effects, after all others.
+    /// Returns the columns with those of other effects appended.
     #[must_use]
     pub fn with_effects(mut self, effects: &Effects) -> Self {
-        self.columns.extend(of_effects(effects, &self.moving));
+        self.columns
+            .extend(effect_columns(effects, &self.identified_joints));
         self.effects = effects.clone();
         self
     }
@@ -230,12 +231,12 @@ impl Columns {
         self.dof
     }
 
-    /// Joints whose torques are modelled.
-    pub fn moving(&self) -> &[usize] {
-        &self.moving
+    /// Identified joints: those whose torques are modelled.
+    pub fn identified_joints(&self) -> &[usize] {
+        &self.identified_joints
     }
 
-    /// Friction of each moving joint.
+    /// Friction columns of each identified joint.
     pub fn friction(&self) -> &FrictionColumns {
         &self.friction
     }
@@ -307,17 +308,17 @@ impl Columns {
     }
 }
 
-/// The columns of effects for the moving joints.
-fn of_effects(effects: &Effects, moving: &[usize]) -> Vec<Column> {
+/// Returns the columns of effects for the identified joints.
+fn effect_columns(effects: &Effects, identified_joints: &[usize]) -> Vec<Column> {
     let mut columns = Vec::new();
-    for &joint in moving {
+    for &joint in identified_joints {
         columns.extend(effects.springs.then_some(Column::Spring(joint)));
         columns.extend(effects.compliance.then_some(Column::Compliance(joint)));
         columns.extend(effects.torque_scale.then_some(Column::TorqueScale(joint)));
     }
     columns.extend(
         effects
-            .motors(moving)
+            .motors(identified_joints)
             .iter()
             .flat_map(|motor| [Column::MotorCoulomb(*motor), Column::MotorViscous(*motor)]),
     );

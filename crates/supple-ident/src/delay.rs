@@ -1,7 +1,7 @@
 //! Delay between the angles and the torques of a log, estimated by cross-validation.
 //!
-//! For each candidate the torques are shifted, the log is divided into parts, and each part is predicted from a fit to the
-//! others. The delay with the least held-out error, over all joints relative to their own torques, is refined by a parabola
+//! For each candidate delay the torques are shifted, the log is divided into parts, and each part is predicted from a fit to the
+//! others. The delay with the minimum held-out error, over all joints relative to their own torques, is refined by a parabola
 //! through its neighbours.
 
 use crate::error::IdentError;
@@ -11,13 +11,13 @@ use crate::log_checks::weighted_fit::{FitContext, GramMatrices};
 use crate::motion::Preparation;
 use supple_core::Arm;
 
-/// Largest delay that is looked for, either sign \[s\].
+/// Maximum delay of the search, for either sign \[s\].
 pub const MAX_DELAY_S: f64 = 0.06;
 /// Steps of the search \[s\], from coarse to fine.
 const STEPS_S: [f64; 3] = [0.012, 0.004, 0.001];
 /// Number of parts of the log.
 const PARTS: usize = 4;
-/// Gain of the score below which the log does not distinguish a delay from none.
+/// Minimum gain of the score; below it the log does not distinguish the delay from zero.
 const MIN_GAIN: f64 = 1e-3;
 
 /// Estimated delay of a log's torques after its angles.
@@ -27,22 +27,22 @@ pub struct DelayEstimate {
     pub delay_s: f64,
     /// Held-out error, geometric mean of the joints' relative errors, without compensation.
     pub error_without: f64,
-    /// The same with the delay compensated.
+    /// Held-out error with the delay compensated.
     pub error_with: f64,
 }
 
-/// Estimates the delay of `log`. Rate, filter and delay of `preparation` are replaced; the search is around no delay.
+/// Estimates the delay of `log`. Rate, filter and delay of `preparation` are replaced; the search is centred on zero.
 ///
 /// # Errors
 /// A log that is too short for its filter.
 pub fn estimate_delay<const N: usize>(
     nominal: &Arm<N>,
     log: &Log,
-    moving: &[usize],
+    identified_joints: &[usize],
     couplings: &[(usize, usize)],
     preparation: &Preparation,
 ) -> Result<DelayEstimate, IdentError> {
-    let context = FitContext::new(nominal, moving, couplings)?;
+    let context = FitContext::new(nominal, identified_joints, couplings)?;
     let mut known: Vec<(f64, f64)> = Vec::new();
     let mut score = |delay_s: f64| -> Result<f64, IdentError> {
         let same = |(d, _): &&(f64, f64)| (d - delay_s).abs() < 1e-9;
@@ -100,7 +100,7 @@ pub fn estimate_delay<const N: usize>(
 
 /// Mean over the joints of the logarithm of the held-out error.
 fn held_out<const N: usize>(context: &FitContext<'_, N>, parts: &[GramMatrices]) -> f64 {
-    let joints = context.columns.moving().len();
+    let joints = context.columns.identified_joints().len();
     let mut errors = vec![[0.0, 0.0]; joints];
     for (p, part) in parts.iter().enumerate() {
         let others = parts.iter().enumerate().filter(|(other, _)| *other != p);

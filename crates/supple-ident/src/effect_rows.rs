@@ -1,4 +1,4 @@
-//! Rows of the effects of [`crate::effects`], and what is learned from their values.
+//! Rows of the effects of [`crate::effects`], and the learned terms that follow from their values.
 
 use crate::columns::{Column, Columns};
 use crate::effects::Effects;
@@ -13,7 +13,7 @@ pub(crate) const COMPLIANCE_UNIT: f64 = 1e-3;
 /// Step of the difference quotient of gravity \[rad\].
 const STEP_RAD: f64 = 1e-5;
 
-/// What the columns of one state need.
+/// Derivatives of the gravity torque at one state, from which the effect columns are computed.
 pub(crate) struct EffectState<const N: usize> {
     tilt: [Vector<N>; 2],
     compliance: Matrix<N, N>,
@@ -47,7 +47,7 @@ impl<const N: usize> EffectState<N> {
         state
     }
 
-    /// Torque of each joint by a unit of `column`; `None` for a column of another kind.
+    /// Returns the torque of each joint per unit of `column`; `None` for a column that is not an effect.
     pub fn torque_nm(
         &self,
         columns: &Columns,
@@ -97,7 +97,7 @@ pub(crate) fn spring_map<const N: usize>(
     core::array::from_fn(|k| slope * (lower + interval * (k as f64 - 0.5)))
 }
 
-/// The learned terms of identified springs, tilt and torque scales.
+/// Returns the learned terms of identified springs, tilt and torque scales.
 pub(crate) fn learned<const N: usize>(
     columns: &Columns,
     value: &dyn Fn(Column) -> f64,
@@ -105,7 +105,7 @@ pub(crate) fn learned<const N: usize>(
 ) -> LearnedTerms<N> {
     let bounds = LearnedBounds::new(&config.friction, &config.limits.joint_torque_nm);
     let mut terms = LearnedTerms::zero();
-    for &joint in columns.moving() {
+    for &joint in columns.identified_joints() {
         let bound_nm = bounds.map_nm[joint];
         let spring = spring_map(config, joint, value(Column::Spring(joint)));
         terms.map[joint] = JointMap {
@@ -113,7 +113,7 @@ pub(crate) fn learned<const N: usize>(
             ..JointMap::ZERO
         };
     }
-    for &joint in columns.moving() {
+    for &joint in columns.identified_joints() {
         let bound = bounds.parameters.torque_scale[joint];
         terms.parameters.torque_scale[joint] =
             value(Column::TorqueScale(joint)).clamp(-bound, bound);

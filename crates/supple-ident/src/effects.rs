@@ -1,4 +1,4 @@
-//! What a real arm has besides its links and the friction of its joints.
+//! Effects of a real arm besides its links and the friction of its joints.
 //!
 //! ```text
 //! tau += k_j (q_j)                                  spring over joint j: hoses and wires
@@ -9,13 +9,13 @@
 //!      + s_j (Y_j p)                                a motor that gives 1 / (1 + s_j) of the torque that it is commanded
 //! ```
 //!
-//! Friction at the motors is that of the joints unless a motor drives several: only these have columns. `G` and `Y p` are those
-//! of the nominal arm; an error of some per cent of them is one of some per cent in the small effect. What all motors have in
-//! common of `s` is in the links.
+//! Motor friction equals joint friction unless a motor drives several joints: only these motors have columns. `G` and `Y p` are
+//! those of the nominal arm; a relative error of some per cent in them gives the same relative error of the small effect. The
+//! common part of `s` of all motors is contained in the parameters of the links.
 
 use nalgebra::DMatrix;
 
-/// Which of the effects are identified.
+/// Selection of the effects to identify.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Effects {
     /// Springs over the joints.
@@ -31,7 +31,7 @@ pub struct Effects {
 }
 
 impl Effects {
-    /// All of them, for an arm with this `j2mp`.
+    /// All effects, for an arm with this `j2mp`.
     pub fn all(motor_from_joint: DMatrix<f64>) -> Effects {
         Effects {
             springs: true,
@@ -42,12 +42,15 @@ impl Effects {
         }
     }
 
-    /// Motors that drive several moving joints.
-    pub(crate) fn motors(&self, moving: &[usize]) -> Vec<usize> {
+    /// Motors that drive several identified joints.
+    pub(crate) fn motors(&self, identified_joints: &[usize]) -> Vec<usize> {
         let motors = self.motor_from_joint.as_ref().map_or(0, DMatrix::nrows);
         let drives = |motor: usize| {
             let row = self.row(motor);
-            moving.iter().filter(|joint| row[**joint] != 0.0).count()
+            identified_joints
+                .iter()
+                .filter(|joint| row[**joint] != 0.0)
+                .count()
         };
         (0..motors).filter(|motor| drives(*motor) > 1).collect()
     }

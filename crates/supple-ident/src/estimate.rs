@@ -1,28 +1,28 @@
 //! Unconstrained least squares: ordinary, weighted by joint, and robust (Huber).
 //!
-//! Undetermined parameters are taken from a prior: the solution nearest to it. The result may be physically
-//! inconsistent; [`crate::consistent`] has the constrained solver.
+//! Undetermined parameters take the values of a prior: the solver returns the solution nearest to the prior. The result may be
+//! physically inconsistent; [`crate::constrained_least_squares`] has the constrained solver.
 
-use crate::base::pivot_order;
+use crate::base_parameters::pivot_order;
 use crate::error::IdentError;
 use crate::qr_reduction::ReducedSystem;
 use crate::regressor::JointRows;
 use nalgebra::{DMatrix, DVector};
 
-/// Residuals beyond this multiple of the standard deviation get less weight: 95 % efficiency for Gaussian
+/// Multiple of the standard deviation beyond which residuals get less weight: 95 % efficiency for Gaussian
 /// noise.
 const HUBER: f64 = 1.345;
 /// Ratio of standard deviation to median absolute deviation for Gaussian noise.
 const MAD: f64 = 1.4826;
 /// Maximum number of reweighting iterations.
-const ROUNDS: usize = 20;
+const MAX_REWEIGHTINGS: usize = 20;
 
 /// Moore-Penrose inverse by a complete orthogonal decomposition: `A = Q W` by QR with column pivoting,
 /// `W' = Z T` by QR, so that the inverse is `Z T'^-1 Q'`. Columns whose remaining norm is below `tolerance`
-/// times the largest count as dependent, as in [`crate::base`].
+/// times the largest count as dependent, as in [`crate::base_parameters`].
 ///
-/// nalgebra's singular value decomposition is not used: for one in a thousand singular matrices its third digit
-/// is wrong, and these matrices are singular by construction.
+/// nalgebra's singular value decomposition is not used: for one in a thousand singular matrices its result is wrong in the third
+/// digit, and these matrices are singular by construction.
 ///
 /// # Errors
 /// [`IdentError::Singular`] if all columns are zero or a value is not finite.
@@ -53,7 +53,7 @@ pub fn min_norm_solution(
     Ok(pseudo_inverse(a, tolerance)? * b)
 }
 
-/// The solution of `min |a x - b|` nearest to `prior`, with columns scaled to unit length.
+/// Returns the solution of `min |a x - b|` nearest to `prior`, with columns scaled to unit length.
 ///
 /// # Errors
 /// As [`pseudo_inverse`].
@@ -72,7 +72,7 @@ pub fn nearest(block: &ReducedSystem, prior: &DVector<f64>) -> Result<DVector<f6
     let step = min_norm_solution(
         &scaled,
         &(block.b() - &a * prior),
-        crate::base::RANK_TOLERANCE,
+        crate::base_parameters::RANK_TOLERANCE,
     )?;
     Ok(prior + DVector::from_fn(prior.len(), |j, _| step[j] * scale(j)))
 }
@@ -110,7 +110,7 @@ pub fn weighted_least_squares(
 ) -> Result<(DVector<f64>, Vec<f64>), IdentError> {
     let mut noise = vec![1.0; blocks.len()];
     let mut x = nearest(&weighted(blocks, &noise, prior.len()), prior)?;
-    for _ in 0..ROUNDS {
+    for _ in 0..MAX_REWEIGHTINGS {
         let next = noise_nm(blocks, &x);
         let change = next.iter().zip(&noise).map(|(a, b)| (a / b - 1.0).abs());
         let settled = change.fold(0.0, f64::max) < 1e-3;
@@ -141,7 +141,7 @@ pub fn huber_weights(joints: &[JointRows], x: &DVector<f64>) -> Vec<Vec<f64>> {
 #[cfg(test)]
 mod tests {
     use super::pseudo_inverse;
-    use crate::base::RANK_TOLERANCE;
+    use crate::base_parameters::RANK_TOLERANCE;
     use crate::random::{Normal, Random};
     use nalgebra::DMatrix;
 

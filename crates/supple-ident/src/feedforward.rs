@@ -1,6 +1,7 @@
-//! Torques of a controller's feed-forward in a motion: links and friction, compliance and learned terms.
+//! Feed-forward torques of a controller along a motion: links and friction, compliance and learned terms.
 //!
-//! Not those of a fit, which has terms that a controller leaves out, such as viscous friction that differs by direction.
+//! They differ from the prediction of a fit, which has terms that a controller does not have, such as viscous friction that
+//! differs by direction.
 
 use crate::motion::Motion;
 use nalgebra::DMatrix;
@@ -10,17 +11,19 @@ use supple_core::learned_torque::{LearnedAtPose, learned_torque_nm};
 use supple_core::math::Vector3;
 use supple_core::{Config, Vector};
 
-/// Feed-forward of a controller with this configuration along a motion, (samples, N) \[N m\].
+/// Returns the feed-forward of a controller with this configuration along a motion, (samples, N) \[N m\].
 pub fn feedforward_nm<const N: usize>(config: &Config<N>, motion: &Motion) -> DMatrix<f64> {
     each_sample(config, motion, |_, whole| whole)
 }
 
-/// What compliance and learned terms add to the torques of links and friction along a motion, (samples, N) \[N m\].
+/// Returns the torques that compliance and learned terms add to those of links and friction along a motion, (samples, N)
+/// \[N m\].
 pub(crate) fn effects_nm<const N: usize>(config: &Config<N>, motion: &Motion) -> DMatrix<f64> {
     each_sample(config, motion, |plain, whole| whole - plain)
 }
 
-/// A torque for each sample, from that of links and friction at the encoders' angles and the whole one.
+/// Returns `of(plain, whole)` for each sample: `plain` is the torque of links and friction at the encoders' angles, `whole` the
+/// total feed-forward.
 fn each_sample<const N: usize>(
     config: &Config<N>,
     motion: &Motion,

@@ -1,11 +1,11 @@
 //! Fourth-order Butterworth low pass, run forwards and backwards: zero phase, squared magnitude.
 //!
-//! Two second-order sections by the bilinear transform, prewarped. Both ends are extended by odd reflection,
+//! The filter has two second-order sections from the prewarped bilinear transform. Both ends are extended by odd reflection,
 //! `2 x_0 - x_k`, over 15 samples, and each pass starts from the steady state of its first value, as in
 //! `scipy.signal.sosfiltfilt`, with which the tests compare it.
 //!
-//! It is not the filter of the simulated force sensor (`supple_plant`), which runs forwards in time. The two stay apart:
-//! what prepares the controller's model and what measures how well that model does share no formula.
+//! The simulated force sensor (`supple_plant`) has another filter, which runs forwards in time. The two implementations are
+//! independent on purpose: the identification of the model shares no code with the measurements that evaluate the model.
 
 use crate::error::{IdentError, positive};
 use nalgebra::DMatrix;

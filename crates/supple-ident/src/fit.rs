@@ -1,9 +1,8 @@
-//! From prepared motions to a model: rows, weights, solution, statistics.
+//! Fits a model to prepared motions: regressor rows, weights, solution, statistics.
 
-use crate::base::{BaseParameters, RANK_TOLERANCE};
-use crate::choice::Choice;
+use crate::base_parameters::{BaseParameters, RANK_TOLERANCE};
 use crate::columns::{Column, Columns};
-use crate::consistent::{Constraints, solve};
+use crate::constrained_least_squares::{Constraints, solve};
 use crate::effect_rows;
 use crate::error::{IdentError, Warning, shape_error};
 use crate::estimate::{huber_weights, nearest, noise_nm, weighted, weighted_least_squares};
@@ -14,6 +13,7 @@ pub use crate::options::{Options, Weights};
 use crate::qr_reduction::ReducedSystem;
 use crate::random::Random;
 use crate::regressor::{joint_rows, rows_under_load};
+use crate::selection_result::SelectionResult;
 use nalgebra::{DMatrix, DVector};
 use supple_core::dynamics::{regressor, regressor_times};
 use supple_core::friction::LoadTorque;
@@ -28,11 +28,12 @@ pub const STEADY_SLIDING_RAD: f64 = 4e-3;
 const MIN_ROWS: usize = 20;
 
 /// Maximum number of reweighting iterations.
-const ROUNDS: usize = 5;
-/// Passes in which a prediction finds the torque of a motor whose friction depends on it.
+const MAX_REWEIGHTINGS: usize = 5;
+/// Number of fixed-point passes of a prediction for a motor whose friction depends on its own torque.
 const LOAD_PASSES: usize = 4;
 
-/// Samples that the prior of an effect counts for, as a root: errors of the model are correlated over many samples.
+/// Weight of the prior of an effect: the square root of the number of samples that it counts for. Errors of the model are
+/// correlated over many samples.
 const EFFECT_PRIOR_WEIGHT: f64 = 50.0;
 
 /// An identified model.
@@ -46,7 +47,7 @@ pub struct Fit<const N: usize> {
     pub base: BaseParameters,
     /// Standard deviation of each base parameter.
     pub base_std: DVector<f64>,
-    /// RMS residual of each moving joint \[N m\].
+    /// RMS residual of each identified joint \[N m\].
     pub noise_nm: Vec<f64>,
     /// Upper bound on the distance of the objective from its optimum, for a consistent fit.
     pub optimality_gap: Option<f64>,
@@ -54,22 +55,22 @@ pub struct Fit<const N: usize> {
     pub training_relative: f64,
     /// Preparation of validation logs.
     pub preparation: Preparation,
-    /// Choices made by cross-validation, in order.
-    pub choices: Vec<Choice>,
+    /// Options selected by cross-validation, in order.
+    pub choices: Vec<SelectionResult>,
     /// Warnings.
     pub warnings: Vec<Warning>,
-    /// Load \[N m\] of each moving joint at which load-dependent friction best matches load-independent
+    /// Load \[N m\] of each identified joint at which load-dependent friction best matches load-independent
     /// friction over the fitted samples; zero without load columns.
     pub load_nm: Vec<f64>,
-    /// Travel of each joint of the arm over which its dry friction turns round after a reversal \[rad\]; zero where the
-    /// reversals do not show it, see [`crate::presliding_rad`].
+    /// Travel of each joint of the arm over which its dry friction reverses after a reversal of motion \[rad\]; zero if the
+    /// data do not determine it, see [`crate::presliding_rad`].
     pub presliding_rad: Vec<f64>,
     /// Standard deviation of the weighted residuals, corrected for the correlation that the filter introduces.
     spread: f64,
     nominal: Arm<N>,
 }
 
-/// Fits `motions` of an arm of which `moving` joints are identified. Undetermined parameters are regularised
+/// Fits `motions` of an arm, for the joints `identified_joints`. Undetermined parameters are regularised
 /// towards `nominal`.
 ///
 /// # Errors
@@ -77,12 +78,12 @@ pub struct Fit<const N: usize> {
 pub fn fit<const N: usize>(
     nominal: &Arm<N>,
     motions: &[Motion],
-    moving: &[usize],
+    identified_joints: &[usize],
     options: &Options,
 ) -> Result<Fit<N>, IdentError> {
     let columns = Columns::new(
         N,
-        moving,
+        identified_joints,
         options.rotor,
         options.friction,
         &options.couplings,
@@ -99,7 +100,7 @@ pub fn fit<const N: usize>(
     fit_rows(nominal, columns, &parts, independent_fraction, options)
 }
 
-/// As [`fit`], from given rows: one list of joints for each part.
+/// Does the same as [`fit`], from given rows: for each part of the data, one [`JointRows`] per identified joint.
 ///
 /// # Errors
 /// As [`fit`].
@@ -116,7 +117,7 @@ pub fn fit_rows<const N: usize>(
     let used: Vec<usize> = (0..columns.len())
         .filter(|i| !(second_stage && matches!(columns.list()[*i], Column::Stribeck(_))))
         .collect();
-    let stage = Stage {
+    let stage = FitStage {
         columns: &columns,
         used: &used,
         parts,
@@ -126,7 +127,7 @@ pub fn fit_rows<const N: usize>(
     };
     let blocks = stage.blocks(None);
     // A joint with too few rows has undetermined friction and rotor inertia; reject it.
-    for (block, joint) in blocks.iter().zip(columns.moving()) {
+    for (block, joint) in blocks.iter().zip(columns.identified_joints()) {
         if block.rows() < MIN_ROWS {
             let slow = options.slow_rad_per_s;
             return Err(IdentError::Log {
@@ -146,7 +147,7 @@ pub fn fit_rows<const N: usize>(
     }
     let (solution, blocks, noise, gap) = stage.solve(blocks)?;
     let stacked = weighted(&blocks, &noise, used.len());
-    let base = BaseParameters::of(&stacked.a(), RANK_TOLERANCE)?;
+    let base = BaseParameters::from_regressor(&stacked.a(), RANK_TOLERANCE)?;
     let freedom = (rows - base.rank().min(rows - 1)) as f64 * independent_fraction;
     let spread = (stacked.error_squared(&solution) / freedom.max(1.0)).sqrt();
     let base_std = base.standard_deviations(spread);
@@ -168,7 +169,7 @@ pub fn fit_rows<const N: usize>(
         base: base.renumbered(&used),
         base_std,
         noise_nm: noise_nm(&blocks, &solution),
-        load_nm: loads(&columns, parts),
+        load_nm: load_torques_nm(&columns, parts),
         presliding_rad: vec![0.0; N],
         columns,
         x,
@@ -177,7 +178,7 @@ pub fn fit_rows<const N: usize>(
     })
 }
 
-/// Mean and standard deviation of an effect's column before any motion.
+/// Prior mean and standard deviation of an effect's column.
 fn effect_prior(column: &Column) -> Option<(f64, f64)> {
     match column {
         Column::Spring(_) => Some((0.0, 0.2)),
@@ -189,7 +190,7 @@ fn effect_prior(column: &Column) -> Option<(f64, f64)> {
     }
 }
 
-struct Stage<'a> {
+struct FitStage<'a> {
     columns: &'a Columns,
     used: &'a [usize],
     parts: &'a [Vec<JointRows>],
@@ -198,12 +199,12 @@ struct Stage<'a> {
     links: Vec<nalgebra::SVector<f64, 10>>,
 }
 
-type Solved = (DVector<f64>, Vec<ReducedSystem>, Vec<f64>, Option<f64>);
+type StageSolution = (DVector<f64>, Vec<ReducedSystem>, Vec<f64>, Option<f64>);
 
-impl Stage<'_> {
+impl FitStage<'_> {
     /// One reduced system for each joint, over all parts.
     fn blocks(&self, weights: Option<&[Vec<Vec<f64>>]>) -> Vec<ReducedSystem> {
-        let joints = self.columns.moving().len();
+        let joints = self.columns.identified_joints().len();
         let of_joint = |j: usize| {
             let mut all = ReducedSystem::empty(self.used.len());
             for (p, part) in self.parts.iter().enumerate() {
@@ -220,7 +221,7 @@ impl Stage<'_> {
         (0..joints).map(of_joint).collect()
     }
 
-    fn solve(&self, mut blocks: Vec<ReducedSystem>) -> Result<Solved, IdentError> {
+    fn solve(&self, mut blocks: Vec<ReducedSystem>) -> Result<StageSolution, IdentError> {
         let joints = blocks.len();
         let mut noise = match &self.options.weights {
             Weights::Equal => vec![1.0; joints],
@@ -238,7 +239,7 @@ impl Stage<'_> {
             self.options.weights,
             Weights::ByJointResidual | Weights::Huber
         ) {
-            for _ in 0..ROUNDS {
+            for _ in 0..MAX_REWEIGHTINGS {
                 self.options.cancellation.check()?;
                 if self.options.weights == Weights::Huber {
                     let mut full = DVector::zeros(self.columns.len());
@@ -266,7 +267,7 @@ impl Stage<'_> {
         Ok((x, blocks, noise, gap))
     }
 
-    /// Mean and standard deviation of a rotor's inertia before any motion.
+    /// Prior mean and standard deviation of a rotor's inertia.
     fn rotor_prior(&self, unknown: usize, column: &Column) -> Option<(f64, f64)> {
         let nominal = self.prior[unknown];
         let is_rotor = matches!(column, Column::Rotor(_)) && nominal > 0.0;
@@ -274,7 +275,7 @@ impl Stage<'_> {
         Some((nominal, relative * nominal))
     }
 
-    /// What is known of the effects and of the rotors before any motion, as rows.
+    /// Rows of the prior of effects and rotors.
     fn effect_prior(&self) -> DMatrix<f64> {
         let known = self.used.iter().enumerate().filter_map(|(k, i)| {
             let column = &self.columns.list()[*i];
@@ -320,8 +321,8 @@ impl Stage<'_> {
     }
 }
 
-/// For each moving joint, the multiple of its Coulomb column that is nearest to its load column.
-fn loads(columns: &Columns, parts: &[Vec<JointRows>]) -> Vec<f64> {
+/// Returns for each identified joint the multiple of its Coulomb column that is nearest to its load column.
+fn load_torques_nm(columns: &Columns, parts: &[Vec<JointRows>]) -> Vec<f64> {
     let of_joint = |(row, &joint): (usize, &usize)| {
         let indices = [Column::Load(joint), Column::Coulomb(joint)].map(|c| columns.position(c));
         let [Some(load), Some(dry)] = indices else {
@@ -335,22 +336,27 @@ fn loads(columns: &Columns, parts: &[Vec<JointRows>]) -> Vec<f64> {
         }
         product / square.max(f64::MIN_POSITIVE)
     };
-    columns.moving().iter().enumerate().map(of_joint).collect()
+    columns
+        .identified_joints()
+        .iter()
+        .enumerate()
+        .map(of_joint)
+        .collect()
 }
 
-/// The same noise for all joints, so that the residuals against which the prior is weighted are about one.
+/// Returns the same noise for all joints, so that the residuals, relative to which the prior is weighted, are about one.
 fn equal_noise(blocks: &[ReducedSystem], x: &DVector<f64>) -> Vec<f64> {
     let squares: f64 = noise_nm(blocks, x).iter().map(|n| n * n).sum();
     vec![(squares / blocks.len() as f64).sqrt(); blocks.len()]
 }
 
 /// Second stage: fits `B >= 0` of each joint to samples below three Stribeck speeds in steady sliding outside
-/// the band. Inside the band the law is a parabola through zero, but real friction persists until standstill,
-/// which would bias the estimate. A constant is fitted beside it and discarded: it absorbs gravity errors.
+/// the band. Inside the band the friction law is a parabola through zero, but real friction persists until standstill,
+/// which would bias the estimate. A constant is fitted together with `B` and discarded: it absorbs gravity errors.
 fn fit_stribeck(columns: &Columns, parts: &[Vec<JointRows>], x: &mut DVector<f64>) {
     let reach = 3.0 * columns.friction().stribeck_rad_per_s.unwrap_or(0.0);
     let band = columns.friction().band_rad_per_s;
-    for (row, &joint) in columns.moving().iter().enumerate() {
+    for (row, &joint) in columns.identified_joints().iter().enumerate() {
         let Some(position) = columns.position(Column::Stribeck(joint)) else {
             continue;
         };
@@ -379,7 +385,7 @@ fn fit_stribeck(columns: &Columns, parts: &[Vec<JointRows>], x: &mut DVector<f64
 }
 
 impl<const N: usize> Fit<N> {
-    /// The identified arm.
+    /// Returns the identified arm.
     ///
     /// # Errors
     /// [`IdentError::NotPhysical`], for plain least squares only.
@@ -387,13 +393,13 @@ impl<const N: usize> Fit<N> {
         model::arm(&self.nominal, &self.columns, &self.x)
     }
 
-    /// Friction of every joint of the arm, in the controller's law; load-dependent friction is given at
-    /// [`Fit::load_nm`].
+    /// Returns the friction of every joint of the arm in the controller's friction law; load-dependent friction refers to the
+    /// load [`Fit::load_nm`].
     pub fn friction(&self) -> Vec<Friction> {
         self.friction_of(&self.x)
     }
 
-    /// Springs and tilt as terms of a controller with this configuration.
+    /// Returns springs, tilt and torque scales as learned terms of a controller with this configuration.
     pub fn learned(&self, config: &Config<N>) -> LearnedTerms<N> {
         effect_rows::learned(&self.columns, &|column| self.value(column), config)
     }
@@ -403,7 +409,7 @@ impl<const N: usize> Fit<N> {
         core::array::from_fn(|j| effect_rows::COMPLIANCE_UNIT * self.value(Column::Compliance(j)))
     }
 
-    /// Torque scale of each joint beyond that of all; zero where it is not identified.
+    /// Torque scale of each joint relative to the common scale of all joints; zero where it is not identified.
     pub fn torque_scale(&self) -> [f64; N] {
         core::array::from_fn(|j| self.value(Column::TorqueScale(j)))
     }
@@ -435,14 +441,25 @@ impl<const N: usize> Fit<N> {
         self.base.condition
     }
 
-    /// Torques of one state \[N m\]. Held joints are taken at rest, whatever `qd` and `qdd` contain, and
-    /// without friction.
+    /// Predicts the torques of one state \[N m\]. Joints that are not identified count as held: at rest, independent of `qd` and
+    /// `qdd`, and without friction.
     pub fn predict(&self, q: &Vector<N>, qd: &Vector<N>, qdd: &Vector<N>) -> Vector<N> {
-        let moving = self.columns.moving();
-        let moving_only = |v: &Vector<N>| {
-            Vector::<N>::from_fn(|j, _| if moving.contains(&j) { v[j] } else { 0.0 })
+        let identified_joints = self.columns.identified_joints();
+        let with_held_at_rest = |v: &Vector<N>| {
+            Vector::<N>::from_fn(|j, _| {
+                if identified_joints.contains(&j) {
+                    v[j]
+                } else {
+                    0.0
+                }
+            })
         };
-        let link_regressor = regressor(&self.nominal, q, &moving_only(qd), &moving_only(qdd));
+        let link_regressor = regressor(
+            &self.nominal,
+            q,
+            &with_held_at_rest(qd),
+            &with_held_at_rest(qdd),
+        );
         let links = model::link_parameters::<N>(&self.x);
         let mut torque = regressor_times(&link_regressor, &links);
         let passes = if self.columns.friction().load == Some(LoadTorque::Motor) {
@@ -454,7 +471,7 @@ impl<const N: usize> Fit<N> {
             let load = (pass > 0).then_some(&torque);
             let rows = rows_under_load(&self.nominal, &self.columns, [q, qd, qdd], load);
             let explained = rows * &self.x;
-            for (row, &joint) in moving.iter().enumerate() {
+            for (row, &joint) in identified_joints.iter().enumerate() {
                 let rotor = match self.columns.position(Column::Rotor(joint)) {
                     Some(_) => 0.0,
                     None => self.nominal.armature()[joint] * qdd[joint],
@@ -465,7 +482,7 @@ impl<const N: usize> Fit<N> {
         torque
     }
 
-    /// A random model from the posterior: the estimate plus a draw of its normal distribution. Held joints have
+    /// Draws a random model from the posterior: the estimate plus a draw of its normal distribution. Held joints have
     /// no friction.
     ///
     /// # Errors

@@ -1,23 +1,23 @@
-//! The rows of one moving joint, and their reduction to a triangular factor.
+//! The rows of one identified joint, and their reduction to a triangular factor.
 
 use crate::qr_reduction::{CHUNK, ReducedSystem};
 use nalgebra::{DMatrix, DVector};
 use std::sync::OnceLock;
 use supple_core::friction::MAX_LOAD_COEFFICIENT;
 
-/// What predicts friction that grows with the torque of the motor: its column contains the measured torque, which a
-/// prediction may not use.
+/// Data for predicting friction that grows with the motor's torque. The column of this friction contains the measured torque,
+/// which a prediction must not use.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotorLoad {
-    /// The column of this friction.
+    /// Index of the column of this friction.
     pub column: usize,
-    /// Its values if the motor transmitted 1 N m, -1 to 1.
+    /// Values of the column for a motor torque of 1 N m, -1 to 1.
     pub direction: Vec<f64>,
     /// Torque of a known rotor, which `b` does not contain \[N m\].
     pub rotor_nm: Vec<f64>,
 }
 
-/// The rows of one moving joint: `a x = b`, one row for each sample.
+/// The rows of one identified joint: `a x = b`, one row for each sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JointRows {
     /// Regressor, (samples, columns).
@@ -60,7 +60,7 @@ impl JointRows {
         make().1
     }
 
-    /// Torques predicted from the motion alone, those of known rotors left out \[N m\].
+    /// Torques predicted from the motion alone, without those of known rotors \[N m\].
     pub fn predicted(&self, x: &DVector<f64>) -> DVector<f64> {
         let mut torque = &self.a * x;
         let Some(load) = &self.motor_load else {

@@ -16,7 +16,7 @@ use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, Config, Friction, Vector};
 use supple_model::{Description, IdentifiedModel};
 
-/// Options: parameters that may change, and their expected changes.
+/// Options of [`learn`]: parameters that may change, and their expected changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Learning {
     /// Samples at which a joint is slower than this are excluded from its rows \[rad/s\].
@@ -55,8 +55,8 @@ pub struct Learned<const N: usize> {
 }
 
 impl<const N: usize> Learned<N> {
-    /// `of`, whose configuration was given to [`learn`], with the learned friction and payload. Its compliance, springs and other
-    /// `[learned]` terms stay, since they were taken into account.
+    /// Returns the description `of` with the learned friction and payload; its configuration must be the one given to [`learn`].
+    /// Compliance, springs and other `[learned]` terms are kept, because [`learn`] has taken them into account.
     ///
     /// # Errors
     /// [`SaveError`].
@@ -79,28 +79,29 @@ impl<const N: usize> Learned<N> {
     }
 }
 
-/// Learns from `motions` of the joints `moving`; the others are at rest.
+/// Learns from `motions` of the joints `identified_joints`; the others are at rest.
 ///
 /// # Errors
 /// Options out of range; no sample fast enough.
 pub fn learn<const N: usize>(
     config: &Config<N>,
     motions: &[Motion],
-    moving: &[usize],
+    identified_joints: &[usize],
     learning: &Learning,
 ) -> Result<Learned<N>, IdentError> {
     let friction = &config.friction;
     positive("slow_rad_per_s", learning.slow_rad_per_s)?;
     positive("friction_change", learning.friction_change)?;
     positive("noise_nm", learning.noise_nm)?;
-    crate::log::check_moving(N, moving)?;
+    crate::log::check_joint_list(N, identified_joints)?;
     let payload_unknowns = if learning.payload_kg.is_some() { 4 } else { 0 };
-    let unknowns = 2 * moving.len() + payload_unknowns;
+    let unknowns = 2 * identified_joints.len() + payload_unknowns;
     let mut gram = DMatrix::zeros(unknowns, unknowns);
     let mut right_hand_side = DVector::zeros(unknowns);
     let mut all_rows: Vec<Row> = Vec::new();
     for motion in motions {
-        for (joint, a, residual_nm) in rows(config, motion, moving, learning, unknowns)? {
+        for (joint, a, residual_nm) in rows(config, motion, identified_joints, learning, unknowns)?
+        {
             // Filtered samples are correlated.
             let weight = motion.independent_fraction / learning.noise_nm.powi(2);
             gram.ger(weight, &a, &a, 1.0);
@@ -118,7 +119,7 @@ pub fn learn<const N: usize>(
         });
     }
     for i in 0..unknowns {
-        gram[(i, i)] += expected(learning, moving.len(), i).powi(-2);
+        gram[(i, i)] += expected(learning, identified_joints.len(), i).powi(-2);
     }
     let change = nalgebra::Cholesky::new(gram)
         .ok_or_else(|| IdentError::Singular {
@@ -129,13 +130,13 @@ pub fn learn<const N: usize>(
     let mut learned = Learned {
         friction: *friction,
         payload: learning.payload_kg.map(|_| {
-            let payload_start = 2 * moving.len();
+            let payload_start = 2 * identified_joints.len();
             Vector4::from_fn(|i, _| change[payload_start + i])
         }),
         before_nm: [0.0; N],
         after_nm: [0.0; N],
     };
-    for (index, &joint) in moving.iter().enumerate() {
+    for (index, &joint) in identified_joints.iter().enumerate() {
         let old = friction[joint];
         let scale = |relative_change: f64| (1.0 + relative_change).max(0.0);
         learned.friction[joint] = Friction {
@@ -158,9 +159,9 @@ pub fn learn<const N: usize>(
 }
 
 /// Expected size of unknown `i`: relative friction change, payload mass, or first moment of that mass at 0.1 m.
-fn expected(learning: &Learning, moving: usize, i: usize) -> f64 {
+fn expected(learning: &Learning, joint_count: usize, i: usize) -> f64 {
     let payload_kg = learning.payload_kg.unwrap_or(1.0);
-    match i.checked_sub(2 * moving) {
+    match i.checked_sub(2 * joint_count) {
         None => learning.friction_change,
         Some(0) => payload_kg,
         Some(_) => 0.1 * payload_kg,
@@ -169,11 +170,11 @@ fn expected(learning: &Learning, moving: usize, i: usize) -> f64 {
 
 type Row = (usize, DVector<f64>, f64);
 
-/// Joint, columns and torque residual of every sample that is used.
+/// Returns joint, columns and torque residual of every sample in use.
 fn rows<const N: usize>(
     config: &Config<N>,
     motion: &Motion,
-    moving: &[usize],
+    identified_joints: &[usize],
     learning: &Learning,
     unknowns: usize,
 ) -> Result<Vec<Row>, IdentError> {
@@ -189,7 +190,7 @@ fn rows<const N: usize>(
     let load_nm: Vec<Vector<N>> = (0..samples)
         .map(|i| gravity(arm, &Vector::from_fn(|j, _| motion.q[(i, j)])))
         .collect();
-    let dry: Vec<Vec<f64>> = moving
+    let dry: Vec<Vec<f64>> = identified_joints
         .iter()
         .map(|&j| {
             let at_load = |i: usize| friction[j].at_load(load_nm[i][j]);
@@ -202,17 +203,24 @@ fn rows<const N: usize>(
     let mut all = Vec::new();
     for i in 0..samples {
         let at = |m: &DMatrix<f64>| Vector::<N>::from_fn(|j, _| m[(i, j)]);
-        let moving_only = |m: &DMatrix<f64>| {
-            Vector::<N>::from_fn(|j, _| if moving.contains(&j) { m[(i, j)] } else { 0.0 })
+        let with_held_at_rest = |m: &DMatrix<f64>| {
+            Vector::<N>::from_fn(|j, _| {
+                if identified_joints.contains(&j) {
+                    m[(i, j)]
+                } else {
+                    0.0
+                }
+            })
         };
         let (q, qd, qdd) = (
             at(&motion.q),
-            moving_only(&motion.qd),
-            moving_only(&motion.qdd),
+            with_held_at_rest(&motion.qd),
+            with_held_at_rest(&motion.qdd),
         );
         let model = rnea(arm, &q, &qd, &qdd);
-        let link_regressor = (unknowns > 2 * moving.len()).then(|| regressor(arm, &q, &qd, &qdd));
-        for (index, &joint) in moving.iter().enumerate() {
+        let link_regressor =
+            (unknowns > 2 * identified_joints.len()).then(|| regressor(arm, &q, &qd, &qdd));
+        for (index, &joint) in identified_joints.iter().enumerate() {
             if qd[joint].abs() < learning.slow_rad_per_s {
                 continue;
             }
@@ -227,7 +235,7 @@ fn rows<const N: usize>(
             a[2 * index + 1] = dry[index][i];
             if let Some(link_regressor) = &link_regressor {
                 for k in 0..4 {
-                    a[2 * moving.len() + k] = link_regressor[joint][N - 1][k];
+                    a[2 * identified_joints.len() + k] = link_regressor[joint][N - 1][k];
                 }
             }
             all.push((joint, a, motion.tau[(i, joint)] - known));
@@ -236,7 +244,7 @@ fn rows<const N: usize>(
     Ok(all)
 }
 
-/// `arm` with a payload of given mass and first moment in the last link's frame, as a point mass.
+/// Returns `arm` with a point-mass payload of given mass and first moment in the last link's frame.
 ///
 /// # Errors
 /// [`IdentError::NotPhysical`] if the result is physically inconsistent.

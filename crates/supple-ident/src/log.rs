@@ -11,8 +11,8 @@ pub(crate) const MAX_ANGLE_RAD: f64 = 25.0;
 const MIN_RANGE_RAD: f64 = 0.02;
 /// A time step longer than this multiple of the median is a gap.
 const GAP_MEDIANS: f64 = 5.0;
-/// Gap that linear interpolation bridges, in periods of the filter's cutoff: a sinusoid at the cutoff is off by
-/// `(2 pi 0.1)^2 / 8`, 5 % of its amplitude, at the worst moment.
+/// Maximum gap that linear interpolation bridges, in periods of the filter's cutoff: the maximum error for a sinusoid at the
+/// cutoff is `(2 pi 0.1)^2 / 8`, 5 % of its amplitude.
 const GAP_PERIODS: f64 = 0.1;
 /// Logs shorter than this cause a warning \[s\].
 const SHORT_S: f64 = 5.0;
@@ -31,41 +31,45 @@ pub struct Log {
 }
 
 impl Log {
-    /// Checks shapes, values, clock, units and motion. `moving` lists the joints to identify; the other joints
+    /// Checks shapes, values, clock, units and motion. `identified_joints` must move; the other joints
     /// may be at rest.
     ///
     /// # Errors
     /// [`IdentError`] with column, sample, value and remedy.
-    pub fn check(&self, dof: usize, moving: &[usize]) -> Result<Vec<Warning>, IdentError> {
-        self.check_for(dof, moving, None)
+    pub fn check(
+        &self,
+        dof: usize,
+        identified_joints: &[usize],
+    ) -> Result<Vec<Warning>, IdentError> {
+        self.check_with_cutoff(dof, identified_joints, None)
     }
 
-    /// As [`Log::check`], with gaps judged by the cutoff of the filter \[Hz\] that the log will pass: a gap that is short
-    /// against its period is interpolated without harm.
+    /// Does the same as [`Log::check`], but accepts gaps that are short relative to the period of the filter's cutoff \[Hz\], because
+    /// interpolation over them is accurate enough.
     ///
     /// # Errors
     /// As [`Log::check`].
-    pub fn check_for(
+    pub fn check_with_cutoff(
         &self,
         dof: usize,
-        moving: &[usize],
+        identified_joints: &[usize],
         cutoff_hz: Option<f64>,
     ) -> Result<Vec<Warning>, IdentError> {
-        let warnings = self.check_for_fit(dof, moving, cutoff_hz)?;
-        self.check_units(moving)?;
+        let warnings = self.check_without_units(dof, identified_joints, cutoff_hz)?;
+        self.check_units(identified_joints)?;
         Ok(warnings)
     }
 
-    /// As [`Log::check_for`], without the units of angles and velocities.
-    pub(crate) fn check_for_fit(
+    /// Does the same as [`Log::check_with_cutoff`], without the units of angles and velocities.
+    pub(crate) fn check_without_units(
         &self,
         dof: usize,
-        moving: &[usize],
+        identified_joints: &[usize],
         cutoff_hz: Option<f64>,
     ) -> Result<Vec<Warning>, IdentError> {
-        self.check_table(dof, moving)?;
+        self.check_table(dof, identified_joints)?;
         self.check_gaps(cutoff_hz)?;
-        let mut warnings = self.check_motion(moving)?;
+        let mut warnings = self.check_motion(identified_joints)?;
         let duration = self.t_s[self.t_s.len() - 1] - self.t_s[0];
         if duration < SHORT_S {
             warnings.push(Warning {
@@ -77,10 +81,14 @@ impl Log {
         Ok(warnings)
     }
 
-    /// Checks shapes, values and that times increase.
-    pub(crate) fn check_table(&self, dof: usize, moving: &[usize]) -> Result<(), IdentError> {
+    /// Checks shapes and values, and that the times increase.
+    pub(crate) fn check_table(
+        &self,
+        dof: usize,
+        identified_joints: &[usize],
+    ) -> Result<(), IdentError> {
         self.check_shapes(dof)?;
-        check_moving(dof, moving)?;
+        check_joint_list(dof, identified_joints)?;
         self.check_values()?;
         self.check_times()
     }
@@ -160,11 +168,11 @@ impl Log {
         Ok(())
     }
 
-    fn check_motion(&self, moving: &[usize]) -> Result<Vec<Warning>, IdentError> {
+    fn check_motion(&self, identified_joints: &[usize]) -> Result<Vec<Warning>, IdentError> {
         let mut warnings = Vec::new();
         for (joint, column) in self.q_rad.column_iter().enumerate() {
             let (min, max) = (column.min(), column.max());
-            if !moving.contains(&joint) {
+            if !identified_joints.contains(&joint) {
                 continue;
             }
             let range = max - min;
@@ -194,7 +202,7 @@ impl Log {
         Ok(warnings)
     }
 
-    fn check_units(&self, moving: &[usize]) -> Result<(), IdentError> {
+    fn check_units(&self, identified_joints: &[usize]) -> Result<(), IdentError> {
         for (joint, column) in self.q_rad.column_iter().enumerate() {
             let max_angle = column.amax();
             if max_angle > MAX_ANGLE_RAD {
@@ -205,10 +213,12 @@ impl Log {
                 ));
             }
         }
-        moving.iter().try_for_each(|j| self.check_velocity_unit(*j))
+        identified_joints
+            .iter()
+            .try_for_each(|j| self.check_velocity_unit(*j))
     }
 
-    /// Compares velocity with the slope of the angle; a ratio of 57 indicates degrees.
+    /// Compares the velocity with the slope of the angle; a ratio of 57 indicates degrees.
     fn check_velocity_unit(&self, joint: usize) -> Result<(), IdentError> {
         let Some(qd) = &self.qd_rad_per_s else {
             return Ok(());
@@ -244,15 +254,18 @@ impl Log {
     }
 }
 
-/// Rejects an empty list, joints that do not exist, and joints that are not in increasing order.
-pub(crate) fn check_moving(dof: usize, moving: &[usize]) -> Result<(), IdentError> {
-    let increasing = moving.windows(2).all(|w| w[0] < w[1]);
-    if !moving.is_empty() && increasing && moving.iter().all(|joint| *joint < dof) {
+/// Rejects an empty list of joints, joints that do not exist, and joints that are not in increasing order.
+pub(crate) fn check_joint_list(dof: usize, identified_joints: &[usize]) -> Result<(), IdentError> {
+    let increasing = identified_joints.windows(2).all(|w| w[0] < w[1]);
+    if !identified_joints.is_empty()
+        && increasing
+        && identified_joints.iter().all(|joint| *joint < dof)
+    {
         return Ok(());
     }
     Err(shape_error(
         "moving",
         format!("joint numbers below {dof}, increasing, at least one"),
-        format!("{moving:?}"),
+        format!("{identified_joints:?}"),
     ))
 }

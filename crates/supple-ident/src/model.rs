@@ -20,12 +20,12 @@ pub fn prior<const N: usize>(arm: &Arm<N>, columns: &Columns) -> DVector<f64> {
     DVector::from_iterator(columns.len(), columns.list().iter().map(value))
 }
 
-/// Ten parameters of each link of `x`.
+/// Returns the ten parameters of each link from `x`.
 pub fn link_parameters<const N: usize>(x: &DVector<f64>) -> [SVector<f64, 10>; N] {
     std::array::from_fn(|k| x.fixed_rows::<10>(10 * k).into_owned())
 }
 
-/// `nominal` with the inertial parameters of `x`; joints without a rotor column keep their rotor.
+/// Returns `nominal` with the inertial parameters of `x`; joints without a rotor column keep their rotor inertia.
 ///
 /// # Errors
 /// [`IdentError::NotPhysical`] if a link is physically inconsistent or a rotor inertia is negative.
@@ -52,15 +52,15 @@ pub fn arm<const N: usize>(
         .map_err(IdentError::NotPhysical)
 }
 
-/// Friction of each joint of the arm, in the controller's law. Effects that this law does not model (asymmetry,
-/// couplings) stay in the columns; load-dependent friction is given at `load_nm` of each moving joint. Held
+/// Returns the friction of each joint of the arm in the controller's friction law. Effects that this law does not model
+/// (asymmetry, couplings) are left out; load-dependent friction refers to the load `load_nm` of each identified joint. Held
 /// joints have no friction.
 pub fn friction(columns: &Columns, x: &DVector<f64>, load_nm: &[f64]) -> Vec<Friction> {
     let value = |column: Column| columns.position(column).map_or(0.0, |i| x[i]);
     let of_joint = |j: usize| {
         let (motor_coulomb_nm, motor_viscous) = motor_friction(columns, x, j);
         let load_coefficient = value(Column::Load(j)).min(MAX_LOAD_COEFFICIENT);
-        let coulomb_at_nm = match columns.moving().binary_search(&j) {
+        let coulomb_at_nm = match columns.identified_joints().binary_search(&j) {
             Ok(row) if load_coefficient > 0.0 => load_nm[row],
             _ => 0.0,
         };
@@ -85,7 +85,7 @@ pub fn friction(columns: &Columns, x: &DVector<f64>, load_nm: &[f64]) -> Vec<Fri
     (0..columns.dof()).map(of_joint).collect()
 }
 
-/// Coulomb and viscous friction of the motors at a joint that moves alone.
+/// Returns Coulomb and viscous friction of the motors at a joint while it moves alone.
 fn motor_friction(columns: &Columns, x: &DVector<f64>, joint: usize) -> (f64, f64) {
     let mut sums = (0.0, 0.0);
     for (column, value) in columns.list().iter().zip(x) {

@@ -23,7 +23,7 @@ pub struct Preparation {
     /// Cutoff of the zero-phase filter \[Hz\]; `None` leaves the signals as they are.
     pub cutoff_hz: Option<f64>,
     /// Decimation factor, at least 1.
-    pub keep_every: usize,
+    pub decimation_factor: usize,
     /// Time from a logged torque to its action on the logged angles \[s\], either sign: 1.5 periods if the log contains
     /// commands that act during the next cycle, negative if it contains measured torques that lag behind the angles.
     pub torque_delay_s: f64,
@@ -35,14 +35,14 @@ impl Default for Preparation {
         Self {
             rate_hz: None,
             cutoff_hz: Some(8.0),
-            keep_every: 1,
+            decimation_factor: 1,
             torque_delay_s: 0.0,
         }
     }
 }
 
 impl Preparation {
-    /// Indices of the kept samples of a grid of `samples` at `rate_hz`: decimated, without the filter
+    /// Returns the indices of the kept samples of a grid of `samples` at `rate_hz`: decimated, without the filter
     /// transients at both ends.
     ///
     /// # Errors
@@ -50,24 +50,26 @@ impl Preparation {
     pub fn kept(&self, rate_hz: f64, samples: usize) -> Result<Vec<usize>, IdentError> {
         let ends = |cutoff_hz: f64| (TRANSIENT_PERIODS * rate_hz / cutoff_hz).ceil() as usize;
         let end = self.cutoff_hz.map_or(0, ends);
-        if samples < 2 * end + 3 * self.keep_every {
+        if samples < 2 * end + 3 * self.decimation_factor {
             return Err(shape_error(
                 "log",
                 format!(
                     "more than {:.3} s: the filter's transient at both ends is cut off",
-                    (2 * end + 3 * self.keep_every) as f64 / rate_hz
+                    (2 * end + 3 * self.decimation_factor) as f64 / rate_hz
                 ),
                 format!("{:.3} s", samples as f64 / rate_hz),
             ));
         }
-        Ok((end..samples - end).step_by(self.keep_every).collect())
+        Ok((end..samples - end)
+            .step_by(self.decimation_factor)
+            .collect())
     }
 }
 
 /// An interval whose samples are not used.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mask {
-    /// The joint whose torque is not used; `None`: all joints.
+pub struct ExcludedInterval {
+    /// Joint whose torque is not used; `None`: all joints.
     pub joint: Option<usize>,
     /// Start \[s\], on the log's clock.
     pub from_s: f64,
@@ -98,27 +100,30 @@ pub struct Motion {
     /// Delay by which the torques were shifted \[s\], see [`Preparation::torque_delay_s`].
     pub torque_delay_s: f64,
     /// Intervals that are not used.
-    pub masks: Vec<Mask>,
+    pub excluded_intervals: Vec<ExcludedInterval>,
 }
 
 impl Motion {
-    /// Checks `log` for an arm of `dof` joints of which `moving` are identified, and prepares it.
+    /// Checks `log` for an arm of `dof` joints, of which `identified_joints` are identified, and prepares it.
     ///
     /// # Errors
     /// A log that [`Log::check`] rejects; an option out of range; too few samples to filter.
     pub fn prepare(
         log: &Log,
         dof: usize,
-        moving: &[usize],
+        identified_joints: &[usize],
         preparation: &Preparation,
     ) -> Result<(Motion, Vec<Warning>), IdentError> {
-        let warnings = log.check_for(dof, moving, preparation.cutoff_hz)?;
-        Ok((Self::of_checked(log, preparation)?, warnings))
+        let warnings = log.check_with_cutoff(dof, identified_joints, preparation.cutoff_hz)?;
+        Ok((Self::from_checked_log(log, preparation)?, warnings))
     }
 
-    /// As [`Motion::prepare`], from a log whose table is known to be sound.
-    pub(crate) fn of_checked(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
-        if preparation.keep_every == 0 {
+    /// Does the same as [`Motion::prepare`], from a log that has been checked already.
+    pub(crate) fn from_checked_log(
+        log: &Log,
+        preparation: &Preparation,
+    ) -> Result<Motion, IdentError> {
+        if preparation.decimation_factor == 0 {
             return Err(IdentError::Option {
                 option: "keep_every",
                 value: 0.0,
@@ -160,7 +165,7 @@ impl Motion {
         };
         let qdd = differentiate(&qd, rate_hz)?;
         let tau = smooth(&log.tau_nm, delay_s)?;
-        let every = preparation.keep_every;
+        let every = preparation.decimation_factor;
         let rows = preparation.kept(rate_hz, q.nrows())?;
         let kept_hz = rate_hz / every as f64;
         let independent = preparation.cutoff_hz.map_or(1.0, |hz| 2.0 * hz / kept_hz);
@@ -174,7 +179,7 @@ impl Motion {
             cutoff_hz: preparation.cutoff_hz.filter(|hz| *hz < 0.45 * kept_hz),
             start_s: log.t_s[0] + rows[0] as f64 / rate_hz,
             torque_delay_s: preparation.torque_delay_s,
-            masks: Vec::new(),
+            excluded_intervals: Vec::new(),
         };
         Ok(motion)
     }
@@ -184,13 +189,14 @@ impl Motion {
         self.start_s + sample as f64 / self.rate_hz
     }
 
-    /// Whether the torque of a joint at a sample is used.
+    /// Returns whether the torque of a joint at a sample is used.
     pub fn used(&self, sample: usize, joint: usize) -> bool {
         let t_s = self.time_s(sample);
-        let covers = |mask: &Mask| {
-            mask.joint.is_none_or(|j| j == joint) && (mask.from_s..=mask.to_s).contains(&t_s)
+        let covers = |interval: &ExcludedInterval| {
+            let of_joint = interval.joint.is_none_or(|j| j == joint);
+            of_joint && (interval.from_s..=interval.to_s).contains(&t_s)
         };
-        !self.masks.iter().any(covers)
+        !self.excluded_intervals.iter().any(covers)
     }
 
     /// Number of samples.
@@ -207,7 +213,7 @@ impl Motion {
             qdd: cut(&self.qdd),
             tau: cut(&self.tau),
             start_s: self.time_s(range.start),
-            masks: self.masks.clone(),
+            excluded_intervals: self.excluded_intervals.clone(),
             ..*self
         }
     }
@@ -219,7 +225,7 @@ pub fn resample(t_s: &[f64], columns: &DMatrix<f64>, rate_hz: f64, delay_s: f64)
     let (Some(&start), Some(&end)) = (t_s.first(), t_s.last()) else {
         return columns.clone();
     };
-    // The slack keeps the last sample of a regular log on its own grid.
+    // The tolerance keeps the last sample of a regular log on its own grid.
     let samples = ((end - start) * rate_hz + 1e-6).floor() as usize + 1;
     let mut resampled = DMatrix::zeros(samples, columns.ncols());
     let mut right = 1;

@@ -13,14 +13,14 @@ pub enum Weights {
     ByJointResidual,
     /// As `ByJointResidual`, with Huber weights against outliers.
     Huber,
-    /// Given standard deviation of the torque noise of each moving joint \[N m\].
+    /// Given standard deviation of the torque noise of each identified joint \[N m\].
     Given(Vec<f64>),
 }
 
 /// Options of a fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// Whether to fit a rotor inertia for each moving joint; otherwise the nominal rotors are taken as known.
+    /// Whether to fit a rotor inertia for each identified joint; otherwise the nominal rotors are taken as known.
     pub rotor: bool,
     /// Friction columns.
     pub friction: FrictionColumns,
@@ -34,9 +34,9 @@ pub struct Options {
     /// Weights of joints and samples.
     pub weights: Weights,
     /// `Some(weight of the prior)`: physically consistent estimate, see
-    /// [`crate::consistent::Constraints::prior_weight`]; `None`: plain least squares.
+    /// [`crate::constrained_least_squares::Constraints::prior_weight`]; `None`: plain least squares.
     pub consistent_prior_weight: Option<f64>,
-    /// Standard deviation of each rotor inertia before any motion, relative to that of the nominal arm; `None`: unknown.
+    /// Prior standard deviation of each rotor inertia, relative to the inertia of the nominal arm; `None`: unknown.
     pub rotor_deviation: Option<f64>,
     /// Ends the fit early.
     pub cancellation: Cancellation,

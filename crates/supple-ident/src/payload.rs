@@ -1,10 +1,10 @@
 //! Payload at the hand: identified from the torques it adds, or, if known, used to calibrate the torque scale.
 //!
-//! Published torque constants of one arm differ by 20 %. A known weight resolves this: compare the torque it
-//! must add at each joint with the logged increase.
+//! Published torque constants of one arm differ by 20 %. A known weight resolves this: the torque that it
+//! must add at each joint is compared with the logged increase.
 
-use crate::base::{BaseParameters, RANK_TOLERANCE};
-use crate::consistent::{Constraints, solve};
+use crate::base_parameters::{BaseParameters, RANK_TOLERANCE};
+use crate::constrained_least_squares::{Constraints, solve};
 use crate::error::{IdentError, shape_error};
 use crate::estimate::nearest;
 use crate::fit::Fit;
@@ -20,7 +20,7 @@ use supple_core::{Body, Vector};
 /// Maximum relative standard deviation of a returned scale.
 const MAX_RELATIVE_SCALE_STD: f64 = 0.05;
 
-/// Ten parameters of `body`, given in the last link's frame, in the order of
+/// Returns the ten parameters of `body`, given in the last link's frame, in the order of
 /// [`supple_core::dynamics::parameters`].
 pub fn parameters_of(body: &Body) -> SVector<f64, 10> {
     let h = body.com_m * body.mass_kg;
@@ -53,7 +53,7 @@ pub fn payload<const N: usize>(
 ) -> Result<Body, IdentError> {
     let mut all = ReducedSystem::empty(10);
     for motion in motions {
-        let loads = added(empty, motion)?;
+        let loads = payload_rows(empty, motion)?;
         for (row, load) in loads.iter().enumerate() {
             let block = load.reduced(0.0, None);
             all.add(&block, 1.0 / empty.noise_nm[row].max(1e-9));
@@ -79,8 +79,8 @@ pub fn payload<const N: usize>(
     })
 }
 
-/// Ratio of true to logged torque of each moving joint, from the fitted motions `without` the `known` payload
-/// and motions `with` it in the last link's frame, with the same torque scales.
+/// Estimates the ratio of true to logged torque of each identified joint, from the fitted motions `without` the `known` payload
+/// and motions `with` the payload in the last link's frame, with the same torque scales.
 ///
 /// Each joint is estimated separately: `tau_j = Y_j x_j + k_j Y_hand p`, where the last term is present only
 /// with the payload; the scale is `1 / k_j`. Since joints share links, common parameters would transfer the
@@ -98,17 +98,19 @@ pub fn torque_scale<const N: usize>(
         .validate()
         .map_err(|error| shape_error("known payload", "a physical body", error.to_string()))?;
     let p = parameters_of(known);
-    let mut blocks =
-        vec![ReducedSystem::empty(empty.columns.len() + 2); empty.columns.moving().len()];
+    let mut blocks = vec![
+        ReducedSystem::empty(empty.columns.len() + 2);
+        empty.columns.identified_joints().len()
+    ];
     let mut independent_fraction: f64 = 1.0;
     for (motions, carries) in [(without, false), (with, true)] {
         for motion in motions {
             independent_fraction = independent_fraction.min(motion.independent_fraction);
             let arm = joint_rows(empty.nominal(), &empty.columns, motion)?;
-            let hand = added(empty, motion)?;
-            for (row, &joint) in empty.columns.moving().iter().enumerate() {
+            let hand = payload_rows(empty, motion)?;
+            for (row, &joint) in empty.columns.identified_joints().iter().enumerate() {
                 let load = &hand[row].a * p * f64::from(u8::from(carries));
-                // Always include the rotor column: a known rotor inertia has the unscaled unit.
+                // Always include the rotor column: the torque of a known rotor inertia is not scaled.
                 let mut a = arm[row]
                     .a
                     .clone()
@@ -123,13 +125,16 @@ pub fn torque_scale<const N: usize>(
     }
     blocks
         .iter()
-        .map(|block| scale_of(block, independent_fraction))
+        .map(|block| torque_scale_from(block, independent_fraction))
         .collect()
 }
 
-/// One over the last unknown; `None` if the data do not determine it.
-fn scale_of(block: &ReducedSystem, independent_fraction: f64) -> Result<Option<f64>, IdentError> {
-    let base = BaseParameters::of(&block.a(), RANK_TOLERANCE)?;
+/// Returns the reciprocal of the last unknown; `None` if the data do not determine it.
+fn torque_scale_from(
+    block: &ReducedSystem,
+    independent_fraction: f64,
+) -> Result<Option<f64>, IdentError> {
+    let base = BaseParameters::from_regressor(&block.a(), RANK_TOLERANCE)?;
     let Ok(index) = base.independent.binary_search(&(block.unknowns() - 1)) else {
         return Ok(None);
     };
@@ -141,10 +146,13 @@ fn scale_of(block: &ReducedSystem, independent_fraction: f64) -> Result<Option<f
     Ok((found > 0.0 && deviation <= MAX_RELATIVE_SCALE_STD * found).then(|| 1.0 / found))
 }
 
-/// For each moving joint, the rows of the payload's ten parameters and the residual of the arm without it.
-fn added<const N: usize>(empty: &Fit<N>, motion: &Motion) -> Result<Vec<JointRows>, IdentError> {
+/// Returns for each identified joint the rows of the payload's ten parameters and the residual of the arm without payload.
+fn payload_rows<const N: usize>(
+    empty: &Fit<N>,
+    motion: &Motion,
+) -> Result<Vec<JointRows>, IdentError> {
     let mut joints = joint_rows(empty.nominal(), &empty.columns, motion)?;
-    let moving = empty.columns.moving();
+    let identified_joints = empty.columns.identified_joints();
     for joint in &mut joints {
         joint.b -= &joint.a * &empty.x;
         joint.a = DMatrix::zeros(motion.samples(), 10);
@@ -152,16 +160,22 @@ fn added<const N: usize>(empty: &Fit<N>, motion: &Motion) -> Result<Vec<JointRow
     }
     for i in 0..motion.samples() {
         let at = |m: &DMatrix<f64>| Vector::<N>::from_fn(|j, _| m[(i, j)]);
-        let moving_only = |m: &DMatrix<f64>| {
-            Vector::<N>::from_fn(|j, _| if moving.contains(&j) { m[(i, j)] } else { 0.0 })
+        let with_held_at_rest = |m: &DMatrix<f64>| {
+            Vector::<N>::from_fn(|j, _| {
+                if identified_joints.contains(&j) {
+                    m[(i, j)]
+                } else {
+                    0.0
+                }
+            })
         };
         let (q, qd, qdd) = (
             at(&motion.q),
-            moving_only(&motion.qd),
-            moving_only(&motion.qdd),
+            with_held_at_rest(&motion.qd),
+            with_held_at_rest(&motion.qdd),
         );
         let rows = regressor(empty.nominal(), &q, &qd, &qdd);
-        for (joint, row) in moving.iter().zip(&mut joints) {
+        for (joint, row) in identified_joints.iter().zip(&mut joints) {
             for (k, value) in rows[*joint][N - 1].iter().enumerate() {
                 row.a[(i, k)] = *value;
             }

@@ -1,9 +1,9 @@
-//! Presliding: the travel over which dry friction turns round after a reversal.
+//! Presliding: the travel over which dry friction reverses after a reversal of motion.
 //!
-//! Below it a joint does not slide: its bearings and cables act as a spring, and the friction follows `p' = v (1 - p
-//! sign(v)) / d` (Dahl 1968) rather than the sign of the velocity. `d` of each joint is the one of a list for which the
-//! torque around every other reversal of the logs is explained best; it counts if the remaining reversals, which took no
-//! part in the choice, are then explained much better than without it.
+//! Within this travel a joint does not slide: its bearings and cables act as a spring, and the friction follows `p' = v (1 - p
+//! sign(v)) / d` (Dahl 1968) rather than the sign of the velocity. For each joint, `d` is selected from a list such that the
+//! model best explains the torque around every second reversal of the logs. It is accepted if it also explains the remaining
+//! reversals, which were not used for the selection, much better than a model without presliding.
 
 use crate::columns::Column;
 use crate::error::IdentError;
@@ -14,15 +14,15 @@ use crate::regressor::joint_rows;
 use nalgebra::DVector;
 use supple_core::Friction;
 
-/// Travels that are tried \[rad\].
+/// Candidate travels \[rad\].
 const TRAVELS_RAD: [f64; 10] = [
     1.5e-4, 2.5e-4, 3.5e-4, 5e-4, 7e-4, 1e-3, 1.4e-3, 2e-3, 4e-3, 8e-3,
 ];
-/// Travel before and after a reversal that counts \[rad\].
+/// Travel before and after a reversal that is evaluated \[rad\].
 const WINDOW_RAD: f64 = 0.01;
-/// Greatest error of the reversals that were not used in the choice, over that without presliding.
+/// Maximum ratio of the errors with and without presliding, over the reversals that were not used for the selection.
 const IMPROVEMENT: f64 = 0.7;
-/// Least number of reversals, and of samples around one.
+/// Minimum number of reversals, and of samples around each.
 const REVERSALS: usize = 4;
 const SAMPLES: usize = 8;
 
@@ -32,7 +32,7 @@ struct Reversal {
     samples: core::ops::Range<usize>,
 }
 
-/// Travel of each joint of the arm over which its dry friction turns round \[rad\]; zero where it is not known.
+/// Identifies the travel of each joint of the arm over which its dry friction reverses \[rad\]; zero if it is not determined.
 ///
 /// # Errors
 /// As [`joint_rows`].
@@ -46,7 +46,7 @@ pub fn presliding_rad<const N: usize>(
         .map(|motion| joint_rows(fit.nominal(), &fit.columns, motion));
     let parts = parts.collect::<Result<Vec<_>, _>>()?;
     let friction = fit.friction();
-    for (row, &joint) in fit.columns.moving().iter().enumerate() {
+    for (row, &joint) in fit.columns.identified_joints().iter().enumerate() {
         let dry = [Column::Coulomb(joint), Column::Stribeck(joint)];
         let mut smooth = fit.x.clone();
         for position in dry
@@ -55,7 +55,7 @@ pub fn presliding_rad<const N: usize>(
         {
             smooth[position] = 0.0;
         }
-        // What dry friction has to explain.
+        // Torque that dry friction has to explain.
         let rest: Vec<DVector<f64>> = parts
             .iter()
             .map(|part| &part[row].b - &part[row].a * &smooth)
@@ -66,7 +66,7 @@ pub fn presliding_rad<const N: usize>(
             continue;
         }
         let errors = |travel_rad: f64| -> Result<[f64; 2], IdentError> {
-            // Those of the motors and of the load are in the rest of the model.
+            // The friction of motors and the load-dependent friction are part of the rest of the model.
             let law = Friction {
                 coulomb_nm,
                 breakaway_nm: coulomb_nm + dip_nm,
@@ -80,7 +80,7 @@ pub fn presliding_rad<const N: usize>(
             let mut sums = [0.0; 2];
             for (k, reversal) in reversals.iter().enumerate() {
                 let of = |i: usize| rest[reversal.motion][i] - dry[reversal.motion][i];
-                // What changes slowly is not of the reversal.
+                // Subtract the mean: slow changes are not caused by the reversal.
                 let mean =
                     reversal.samples.clone().map(of).sum::<f64>() / reversal.samples.len() as f64;
                 let square: f64 = reversal
@@ -107,7 +107,7 @@ pub fn presliding_rad<const N: usize>(
     Ok(found)
 }
 
-/// Dry friction along a motion, filtered as its torques.
+/// Returns the dry friction along a motion, filtered like its torques.
 fn dry_nm(law: &Friction, motion: &Motion, joint: usize) -> Result<Vec<f64>, IdentError> {
     let step_s = 1.0 / motion.rate_hz;
     let mut direction = 0.0;
@@ -126,7 +126,7 @@ fn dry_nm(law: &Friction, motion: &Motion, joint: usize) -> Result<Vec<f64>, Ide
     }
 }
 
-/// The reversals of a joint from which it travels on by [`WINDOW_RAD`] both before and after.
+/// Finds the reversals of a joint with a travel of at least [`WINDOW_RAD`] in one direction before and after.
 fn reversals(motions: &[Motion], joint: usize) -> Vec<Reversal> {
     let mut all = Vec::new();
     for (number, motion) in motions.iter().enumerate() {

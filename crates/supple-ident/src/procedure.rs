@@ -3,20 +3,20 @@
 //! Unset options of a [`Procedure`] are chosen by cross-validation within the logs ([`crate::select`]).
 
 use crate::cancellation::Cancellation;
-use crate::choice::Choice;
 use crate::columns::{Columns, FrictionColumns};
 use crate::delay::estimate_delay;
 use crate::effects::Effects;
 use crate::error::{IdentError, Warning, shape_error};
 use crate::fit::{Fit, fit};
-use crate::log::{Log, check_moving};
+use crate::log::{Log, check_joint_list};
 use crate::log_checks::{Consequence, Finding, Problem, check_log};
-use crate::motion::{Mask, Motion, Preparation};
+use crate::motion::{ExcludedInterval, Motion, Preparation};
 use crate::options::{Options, Weights};
 use crate::select::{
     band_candidates, compare, effects_candidates, friction_candidates, load_candidates,
     prior_candidates, weights_candidates,
 };
+use crate::selection_result::SelectionResult;
 use supple_core::{Arm, Friction};
 
 /// Number of folds of the cross-validation.
@@ -39,7 +39,7 @@ pub enum Method {
     Consistent,
 }
 
-/// Choice of the regressor's friction columns.
+/// Selection of the regressor's friction columns.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum FrictionChoice {
     /// By cross-validation, with the table of its errors.
@@ -53,7 +53,7 @@ pub enum FrictionChoice {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Procedure {
     /// Joints to identify, increasing; `None` for all. The others are held at their logged positions.
-    pub moving: Option<Vec<usize>>,
+    pub identified_joints: Option<Vec<usize>>,
     /// Pairs of joints coupled by a gear: one motor turns with the sum of their angles.
     pub couplings: Vec<(usize, usize)>,
     /// Other effects of a real arm that are identified if cross-validation finds that they predict better; none by default.
@@ -62,22 +62,22 @@ pub struct Procedure {
     pub preparation: Preparation,
     /// Estimation method.
     pub method: Method,
-    /// Choice of the regressor's friction columns.
+    /// Selection of the regressor's friction columns.
     pub friction: FrictionChoice,
-    /// Whether to fit a rotor inertia for each moving joint; otherwise the nominal rotors are taken as known.
+    /// Whether to fit a rotor inertia for each identified joint; otherwise the nominal rotors are taken as known.
     pub rotor: bool,
     /// Prior standard deviation of each rotor inertia, relative to that of the nominal arm; `None`: unknown.
     pub rotor_deviation: Option<f64>,
     /// Samples of a joint slower than this are excluded from its rows \[rad/s\]; if the friction columns
     /// have a Stribeck effect, it is then fitted to them in a second stage.
     pub slow_rad_per_s: f64,
-    /// Weight of the prior of a consistent fit, see [`crate::consistent::Constraints::prior_weight`];
+    /// Weight of the prior of a consistent fit, see [`crate::constrained_least_squares::Constraints::prior_weight`];
     /// `None` chooses by cross-validation.
     pub prior_weight: Option<f64>,
-    /// Known standard deviation of the torque noise of each moving joint \[N m\]; it replaces the weights that the
+    /// Known standard deviation of the torque noise of each identified joint \[N m\]; it replaces the weights that the
     /// method would use.
     pub joint_noise_nm: Option<Vec<f64>>,
-    /// Whether to estimate the delay of each log's torques ([`crate::estimate_delay`]) instead of taking that of
+    /// Whether to estimate the delay of each log's torques ([`crate::estimate_delay`]) instead of using the delay of
     /// `preparation`.
     pub estimate_delay: bool,
     /// Whether to fit a log although [`crate::log_checks`] rejects it; the findings are then warnings.
@@ -91,7 +91,7 @@ impl Default for Procedure {
     /// cross-validation, rotors identified, no sample excluded, delay of the torques estimated.
     fn default() -> Self {
         Procedure {
-            moving: None,
+            identified_joints: None,
             couplings: Vec::new(),
             effects: Effects::default(),
             preparation: Preparation::default(),
@@ -112,41 +112,43 @@ impl Default for Procedure {
 /// Identifies an arm from one or several logs. Kinematics and undetermined parameters are those of `nominal`.
 ///
 /// # Errors
-/// A log that cannot be used, or [`IdentError::WrongLog`] with what was found; too little data; options out of range; singular data; [`IdentError::Cancelled`].
+/// An unusable log; [`IdentError::WrongLog`] with the findings; too little data; options out of range; singular data;
+/// [`IdentError::Cancelled`].
 pub fn identify<const N: usize>(
     nominal: &Arm<N>,
     logs: &[Log],
     procedure: &Procedure,
 ) -> Result<Fit<N>, IdentError> {
-    let moving = procedure.moving_joints(N)?;
+    let identified_joints = procedure.identified_joints(N)?;
     let (mut motions, mut warnings) = (Vec::new(), Vec::new());
     for log in logs {
-        let (motion, motion_warnings) = procedure.prepare(nominal, log, &moving)?;
+        let (motion, motion_warnings) = procedure.prepare(nominal, log, &identified_joints)?;
         motions.push(motion);
         warnings.extend(motion_warnings);
     }
-    let mut found = identify_motions(nominal, &motions, &moving, procedure)?;
+    let mut found = identify_motions(nominal, &motions, &identified_joints, procedure)?;
     warnings.append(&mut found.warnings);
     found.warnings = warnings;
     Ok(found)
 }
 
-/// As [`identify`], from prepared motions.
+/// Does the same as [`identify`], from prepared motions.
 ///
 /// # Errors
 /// As [`identify`].
 pub fn identify_motions<const N: usize>(
     nominal: &Arm<N>,
     motions: &[Motion],
-    moving: &[usize],
+    identified_joints: &[usize],
     procedure: &Procedure,
 ) -> Result<Fit<N>, IdentError> {
     if motions.is_empty() {
         return Err(shape_error("logs", "at least one log", "none"));
     }
-    let (procedure, effects) = procedure.with_chosen_effects(nominal, motions, moving)?;
-    let (options, choices) = procedure.options(nominal, motions, moving)?;
-    let mut found = fit(nominal, motions, moving, &options)?;
+    let (procedure, effects) =
+        procedure.with_chosen_effects(nominal, motions, identified_joints)?;
+    let (options, choices) = procedure.options(nominal, motions, identified_joints)?;
+    let mut found = fit(nominal, motions, identified_joints, &options)?;
     found.preparation = procedure.preparation;
     if procedure.estimate_delay {
         found.preparation.torque_delay_s = median_delay_s(motions);
@@ -156,7 +158,7 @@ pub fn identify_motions<const N: usize>(
     Ok(found)
 }
 
-/// Upper median of the torque delays of the fitted motions, with which logs to validate are prepared.
+/// Upper median of the torque delays of the fitted motions, used to prepare validation logs.
 fn median_delay_s(motions: &[Motion]) -> f64 {
     let mut all: Vec<f64> = motions.iter().map(|m| m.torque_delay_s).collect();
     all.sort_by(f64::total_cmp);
@@ -164,21 +166,27 @@ fn median_delay_s(motions: &[Motion]) -> f64 {
 }
 
 impl Procedure {
-    /// Checks a log against the given arm ([`check_log`]) and prepares it. Intervals to which a finding is
-    /// limited are excluded, with a warning.
+    /// Checks a log against the given arm ([`check_log`]) and prepares it. If a finding is limited to some intervals, these are
+    /// excluded, with a warning.
     ///
     /// # Errors
-    /// As [`Motion::prepare`]; [`IdentError::WrongLog`] with everything that was found.
+    /// As [`Motion::prepare`]; [`IdentError::WrongLog`] with all findings.
     pub fn prepare<const N: usize>(
         &self,
         nominal: &Arm<N>,
         log: &Log,
-        moving: &[usize],
+        identified_joints: &[usize],
     ) -> Result<(Motion, Vec<Warning>), IdentError> {
         self.cancellation.check()?;
         let preparation = &self.preparation;
-        let mut warnings = log.check_for_fit(N, moving, preparation.cutoff_hz)?;
-        let findings = check_log(nominal, log, moving, &self.couplings, preparation)?;
+        let mut warnings = log.check_without_units(N, identified_joints, preparation.cutoff_hz)?;
+        let findings = check_log(
+            nominal,
+            log,
+            identified_joints,
+            &self.couplings,
+            preparation,
+        )?;
         let rejects = |f: &Finding| f.consequence == Consequence::Reject;
         if findings.iter().any(rejects) && !self.accept_wrong_logs {
             return Err(IdentError::WrongLog(findings));
@@ -186,22 +194,30 @@ impl Procedure {
         self.cancellation.check()?;
         let mut own = *preparation;
         if self.estimate_delay {
-            let found = estimate_delay(nominal, log, moving, &self.couplings, preparation)?;
+            let found = estimate_delay(
+                nominal,
+                log,
+                identified_joints,
+                &self.couplings,
+                preparation,
+            )?;
             own.torque_delay_s = found.delay_s;
         }
-        let mut motion = Motion::of_checked(log, &own)?;
+        let mut motion = Motion::from_checked_log(log, &own)?;
         for finding in findings {
             if finding.consequence == Consequence::Mask {
                 let joint = match finding.problem {
                     Problem::Contact => None,
                     _ => finding.joints.first().copied(),
                 };
-                let masks = finding.intervals_s.iter();
-                motion.masks.extend(masks.map(|&(from_s, to_s)| Mask {
-                    joint,
-                    from_s,
-                    to_s,
-                }));
+                let intervals = finding.intervals_s.iter();
+                motion
+                    .excluded_intervals
+                    .extend(intervals.map(|&(from_s, to_s)| ExcludedInterval {
+                        joint,
+                        from_s,
+                        to_s,
+                    }));
             }
             warnings.push(Warning {
                 column: finding.column,
@@ -212,21 +228,21 @@ impl Procedure {
         Ok((motion, warnings))
     }
 
-    /// The moving joints of an arm of `dof`.
+    /// Returns the joints to identify of an arm with `dof` joints.
     ///
     /// # Errors
     /// [`IdentError::Shape`] for joints that do not exist.
-    pub fn moving_joints(&self, dof: usize) -> Result<Vec<usize>, IdentError> {
-        let moving = self
-            .moving
+    pub fn identified_joints(&self, dof: usize) -> Result<Vec<usize>, IdentError> {
+        let identified_joints = self
+            .identified_joints
             .clone()
             .unwrap_or_else(|| (0..dof).collect::<Vec<_>>());
-        check_moving(dof, &moving)?;
-        Ok(moving)
+        check_joint_list(dof, &identified_joints)?;
+        Ok(identified_joints)
     }
 
-    /// The procedure with those of its effects that cross-validation selects, none, all without the compliance, or all, and the
-    /// choice; without effects there is none.
+    /// Returns the procedure with the effects that cross-validation selects (none, all without the compliance, or all) and the
+    /// result of the selection; `None` for the result if the procedure has no effects.
     ///
     /// # Errors
     /// As [`identify_motions`].
@@ -234,11 +250,11 @@ impl Procedure {
         &self,
         nominal: &Arm<N>,
         motions: &[Motion],
-        moving: &[usize],
-    ) -> Result<(Procedure, Option<Choice>), IdentError> {
-        // A tilt that a part of the joints shows would be that of all.
+        identified_joints: &[usize],
+    ) -> Result<(Procedure, Option<SelectionResult>), IdentError> {
+        // A tilt acts on all joints, so it is identified only together with all joints.
         let effects = Effects {
-            tilt: self.effects.tilt && moving.len() == N,
+            tilt: self.effects.tilt && identified_joints.len() == N,
             ..self.effects.clone()
         };
         if effects == Effects::default() {
@@ -248,7 +264,7 @@ impl Procedure {
             };
             return Ok((none, None));
         }
-        // Friction and prior are chosen with the chosen effects; until then all fits have the same.
+        // Friction and prior are selected after the effects; all candidates here use the same ones.
         let before = Procedure {
             friction: match self.friction {
                 FrictionChoice::Auto => {
@@ -259,27 +275,27 @@ impl Procedure {
             prior_weight: self.prior_weight.or(Some(PRIOR)),
             ..self.clone()
         };
-        let (options, _) = before.options(nominal, motions, moving)?;
+        let (options, _) = before.options(nominal, motions, identified_joints)?;
         let candidates = effects_candidates(&options, &effects);
-        let table = compare(nominal, motions, moving, &candidates, FOLDS)?;
+        let table = compare(nominal, motions, identified_joints, &candidates, FOLDS)?;
         let chosen = Procedure {
             effects: table.options().effects.clone(),
             ..self.clone()
         };
-        let choice = Choice {
+        let choice = SelectionResult {
             subject: "effects",
             table,
         };
         Ok((chosen, Some(choice)))
     }
 
-    /// Complete options and the choices that led to them.
+    /// Returns complete options and the selections that led to them.
     pub(crate) fn options<const N: usize>(
         &self,
         nominal: &Arm<N>,
         motions: &[Motion],
-        moving: &[usize],
-    ) -> Result<(Options, Vec<Choice>), IdentError> {
+        identified_joints: &[usize],
+    ) -> Result<(Options, Vec<SelectionResult>), IdentError> {
         let consistent = self.method == Method::Consistent;
         let auto = self.friction == FrictionChoice::Auto;
         let mut options = Options {
@@ -304,7 +320,7 @@ impl Procedure {
         // Rejects invalid columns before the cross-validation.
         Columns::new(
             N,
-            moving,
+            identified_joints,
             options.rotor,
             options.friction,
             &options.couplings,
@@ -323,9 +339,9 @@ impl Procedure {
         for (subject, enabled, candidates) in steps {
             let candidates = candidates(&options);
             if enabled && !candidates.is_empty() {
-                let table = compare(nominal, motions, moving, &candidates, FOLDS)?;
+                let table = compare(nominal, motions, identified_joints, &candidates, FOLDS)?;
                 options = table.options().clone();
-                choices.push(Choice { subject, table });
+                choices.push(SelectionResult { subject, table });
             }
         }
         Ok((options, choices))
@@ -349,12 +365,12 @@ impl<const N: usize> Fit<N> {
         warnings
     }
 
-    /// Friction of every joint: identified for moving joints, `known` for the others.
+    /// Returns the friction of every joint: identified where the joint was identified, from `known` for the others.
     pub fn friction_with(&self, known: &[Friction]) -> [Friction; N] {
         let found = self.friction();
-        let moving = self.columns.moving();
+        let identified_joints = self.columns.identified_joints();
         core::array::from_fn(|j| {
-            if moving.contains(&j) {
+            if identified_joints.contains(&j) {
                 found[j]
             } else {
                 known.get(j).copied().unwrap_or(Friction::NONE)

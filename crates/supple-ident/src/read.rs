@@ -1,4 +1,4 @@
-//! Logs from files: the project's own MCAP, and comma-separated values.
+//! Reads logs from files: the project's own MCAP, and comma-separated values.
 //!
 //! From an MCAP log, only intervals of controlled free motion are used: excitation, moves, tracking, and
 //! probing without contact. A CSV file has a header line with the names `t`, `q[0]`, `q[1]`, ..., `tau[0]`,
@@ -11,7 +11,7 @@ use supple_core::controller::Mode;
 use supple_log::{LogError, Reader};
 
 /// Shorter intervals are skipped \[s\].
-const MIN_STRETCH_S: f64 = 2.0;
+const MIN_INTERVAL_S: f64 = 2.0;
 /// Time that is skipped after contact, a fault or a change of mode \[s\].
 const SETTLE_S: f64 = 0.3;
 
@@ -25,7 +25,7 @@ pub enum ReadError {
     #[error(transparent)]
     Mcap(#[from] LogError),
     /// A file that cannot be opened.
-    #[error("{file}: cannot be read: {error}; give a regular file that can be")]
+    #[error("{file}: cannot be read: {error}; give a regular, readable file")]
     File {
         /// Path.
         file: String,
@@ -44,16 +44,18 @@ pub enum ReadError {
     },
 }
 
-/// The usable intervals of a file: MCAP if its extension is `.mcap`, otherwise CSV. Where an MCAP has an excitation, the
-/// moves between poses in it are left out: they hardly move some joints, and a verdict does not rest on them.
+/// Reads the usable intervals of a file: MCAP if its extension is `.mcap`, otherwise CSV. If an MCAP contains an excitation, its
+/// moves between poses are left out, because they hardly move some joints and are not suited for validation.
 ///
 /// # Errors
 /// [`ReadError`]; an MCAP of an arm with another number of joints.
 pub fn read_logs<const N: usize>(path: &Path) -> Result<Vec<Log>, ReadError> {
     if path.extension().is_some_and(|ending| ending == "mcap") {
-        let stretches = stretches::<N>(path)?;
-        let excites = stretches.iter().any(|(mode, _)| *mode == Mode::Excite);
-        let kept = stretches
+        let free_motion_intervals = free_motion_intervals::<N>(path)?;
+        let excites = free_motion_intervals
+            .iter()
+            .any(|(mode, _)| *mode == Mode::Excite);
+        let kept = free_motion_intervals
             .into_iter()
             .filter(|(mode, _)| !excites || *mode != Mode::Move);
         Ok(kept.map(|(_, log)| log).collect())
@@ -62,26 +64,26 @@ pub fn read_logs<const N: usize>(path: &Path) -> Result<Vec<Log>, ReadError> {
     }
 }
 
-/// The intervals of free motion of an MCAP, with torques without ripple compensation.
+/// Reads the intervals of free motion of an MCAP; the torques do not include the ripple compensation.
 ///
 /// # Errors
 /// [`ReadError`].
 pub fn read_mcap<const N: usize>(path: &Path) -> Result<Vec<Log>, ReadError> {
-    Ok(stretches::<N>(path)?
+    Ok(free_motion_intervals::<N>(path)?
         .into_iter()
         .map(|(_, log)| log)
         .collect())
 }
 
-/// The intervals of free motion of an MCAP, each with its mode.
-fn stretches<const N: usize>(path: &Path) -> Result<Vec<(Mode, Log)>, ReadError> {
+/// Reads the intervals of free motion of an MCAP, each with its mode.
+fn free_motion_intervals<const N: usize>(path: &Path) -> Result<Vec<(Mode, Log)>, ReadError> {
     let reader = Reader::open(path)?;
     let mut logs = Vec::new();
-    let mut stretch: Vec<(f64, [f64; N], [f64; N])> = Vec::new();
+    let mut interval: Vec<(f64, [f64; N], [f64; N])> = Vec::new();
     let (mut settled_s, mut mode) = (f64::NEG_INFINITY, None);
-    // A stretch ends where its mode does.
-    let mut finish = |stretch: &mut Vec<_>, mode: Option<Mode>| {
-        if let (Some(mode), Some(log)) = (mode, finished(std::mem::take(stretch))) {
+    // An interval ends with its mode.
+    let mut finish = |interval: &mut Vec<_>, mode: Option<Mode>| {
+        if let (Some(mode), Some(log)) = (mode, interval_log(std::mem::take(interval))) {
             logs.push((mode, log));
         }
     };
@@ -96,28 +98,28 @@ fn stretches<const N: usize>(path: &Path) -> Result<Vec<(Mode, Log)>, ReadError>
             settled_s = t_s + SETTLE_S;
         }
         if !moves || t_s < settled_s {
-            finish(&mut stretch, mode);
+            finish(&mut interval, mode);
             mode = value.mode();
             continue;
         }
         let torque = core::array::from_fn(|j| value.torque_nm[j] - value.torques.ripple[j]);
-        stretch.push((t_s, value.position_rad.into(), torque));
+        interval.push((t_s, value.position_rad.into(), torque));
     }
-    finish(&mut stretch, mode);
+    finish(&mut interval, mode);
     if logs.is_empty() {
         return Err(ReadError::Table {
             file: path.display().to_string(),
-            problem: format!("no interval of {MIN_STRETCH_S} s of free motion under control"),
+            problem: format!("no interval of {MIN_INTERVAL_S} s of free motion under control"),
             remedy: "record the arm following the series that `supple excite design` gives",
         });
     }
     Ok(logs)
 }
 
-/// The log of a stretch; `None` if it is too short.
-fn finished<const N: usize>(rows: Vec<(f64, [f64; N], [f64; N])>) -> Option<Log> {
+/// Returns the log of an interval; `None` if it is too short.
+fn interval_log<const N: usize>(rows: Vec<(f64, [f64; N], [f64; N])>) -> Option<Log> {
     let (first, last) = (rows.first()?, rows.last()?);
-    (last.0 - first.0 >= MIN_STRETCH_S).then(|| Log {
+    (last.0 - first.0 >= MIN_INTERVAL_S).then(|| Log {
         t_s: rows.iter().map(|row| row.0).collect(),
         q_rad: DMatrix::from_fn(rows.len(), N, |i, j| rows[i].1[j]),
         qd_rad_per_s: None,
@@ -149,7 +151,7 @@ fn parse_csv(text: &str, dof: usize) -> Result<Log, (String, &'static str)> {
         .enumerate()
         .filter(|(_, l)| !l.trim().is_empty());
     let Some((_, header)) = lines.next() else {
-        return Err(("it is empty".to_owned(), names_remedy));
+        return Err(("the file is empty".to_owned(), names_remedy));
     };
     let names: Vec<String> = header
         .split(',')
@@ -199,7 +201,7 @@ fn parse_csv(text: &str, dof: usize) -> Result<Log, (String, &'static str)> {
             let (found, wanted) = (row.len(), names.len());
             return Err((
                 format!(
-                    "line {} has {found} cells, the header has {wanted}",
+                    "line {} has {found} cells, but the header has {wanted}",
                     number + 1
                 ),
                 "give every line as many cells as the header",

@@ -1,4 +1,4 @@
-//! Rows of the regressor: the contribution of each column to each moving joint's torque.
+//! Rows of the regressor: the contribution of each column to each identified joint's torque.
 
 use crate::columns::{Column, Columns};
 use crate::effect_rows::EffectState;
@@ -13,8 +13,8 @@ use supple_core::friction::LoadTorque;
 use supple_core::math::exp;
 use supple_core::{Arm, Friction, Vector};
 
-/// Regressor of one state, (moving joints, columns). Held joints are taken at rest, whatever `qd` and `qdd`
-/// contain. The motors are taken to transmit what the links of `arm` need.
+/// Regressor of one state, (identified joints, columns). Other joints count as held at rest, independent of `qd` and `qdd`. The
+/// motor torques are assumed to be those that the links of `arm` need.
 pub fn rows<const N: usize>(
     arm: &Arm<N>,
     columns: &Columns,
@@ -32,16 +32,16 @@ pub(crate) fn rows_under_load<const N: usize>(
     [q, qd, qdd]: [&Vector<N>; 3],
     motor_nm: Option<&Vector<N>>,
 ) -> DMatrix<f64> {
-    let moving_only = |v: &Vector<N>| {
+    let with_held_at_rest = |v: &Vector<N>| {
         Vector::<N>::from_fn(|j, _| {
-            if columns.moving().contains(&j) {
+            if columns.identified_joints().contains(&j) {
                 v[j]
             } else {
                 0.0
             }
         })
     };
-    let (qd, qdd) = (moving_only(qd), moving_only(qdd));
+    let (qd, qdd) = (with_held_at_rest(qd), with_held_at_rest(qdd));
     let link_regressor = regressor(arm, q, &qd, &qdd);
     let friction = columns.friction();
     let uses_links = columns.effects().torque_scale || friction.load.is_some();
@@ -52,17 +52,17 @@ pub(crate) fn rows_under_load<const N: usize>(
     };
     let dry = unit_dry_friction(columns);
     let effects = EffectState::new(arm, columns.effects(), q);
-    let moving = columns.moving();
-    let mut rows = DMatrix::zeros(moving.len(), columns.len());
+    let identified_joints = columns.identified_joints();
+    let mut rows = DMatrix::zeros(identified_joints.len(), columns.len());
     for (c, column) in columns.list().iter().enumerate() {
         let mut put = |joint: usize, value: f64| {
-            if let Ok(row) = moving.binary_search(&joint) {
+            if let Ok(row) = identified_joints.binary_search(&joint) {
                 rows[(row, c)] = value;
             }
         };
         match *column {
             Column::Link { link, entry } => {
-                for &joint in moving {
+                for &joint in identified_joints {
                     put(joint, link_regressor[joint][link][entry]);
                 }
             }
@@ -95,7 +95,7 @@ pub(crate) fn rows_under_load<const N: usize>(
             | Column::MotorViscous(_)
             | Column::Tilt(_) => {
                 if let Some(torque) = effects.torque_nm(columns, *column, q, &qd) {
-                    moving.iter().for_each(|j| put(*j, torque[*j]));
+                    identified_joints.iter().for_each(|j| put(*j, torque[*j]));
                 }
             }
         }
@@ -126,9 +126,9 @@ fn travel_since_reversal(motion: &Motion, j: usize) -> Vec<f64> {
     motion.qd.column(j).iter().map(after).collect()
 }
 
-/// All rows of a motion, for each moving joint. Dry friction changes sign within a sample or two, faster than
+/// Returns all rows of a motion, for each identified joint. Dry friction changes sign within a sample or two, faster than
 /// the filter of the torques can follow, so its columns pass the same filter. Without a rotor column, the arm's
-/// rotor inertia is taken as known.
+/// rotor inertia counts as known.
 ///
 /// # Errors
 /// [`IdentError::Shape`] if arm, columns and motion differ in their number of joints.
@@ -146,12 +146,12 @@ pub fn joint_rows<const N: usize>(
             ));
         }
     }
-    let (samples, moving) = (motion.samples(), columns.moving());
+    let (samples, identified_joints) = (motion.samples(), columns.identified_joints());
     let known_rotor = |j: usize| match columns.position(Column::Rotor(j)) {
         Some(_) => 0.0,
         None => arm.armature()[j],
     };
-    let mut joints: Vec<JointRows> = moving
+    let mut joints: Vec<JointRows> = identified_joints
         .iter()
         .map(|&j| {
             let rows = DMatrix::zeros(samples, columns.len());
@@ -159,7 +159,7 @@ pub fn joint_rows<const N: usize>(
             let speed = motion.qd.column(j).iter().map(|v| v.abs()).collect();
             let mut rows = JointRows::new(rows, torques, speed);
             rows.travel_since_reversal_rad = travel_since_reversal(motion, j);
-            if !motion.masks.is_empty() {
+            if !motion.excluded_intervals.is_empty() {
                 rows.used = (0..samples).map(|i| motion.used(i, j)).collect();
             }
             rows
@@ -175,7 +175,7 @@ pub fn joint_rows<const N: usize>(
     }
     if columns.friction().load == Some(LoadTorque::Motor) {
         let dry = unit_dry_friction(columns);
-        for (joint, &j) in joints.iter_mut().zip(moving) {
+        for (joint, &j) in joints.iter_mut().zip(identified_joints) {
             joint.motor_load = columns.position(Column::Load(j)).map(|column| MotorLoad {
                 column,
                 direction: (motion.qd.column(j).iter())

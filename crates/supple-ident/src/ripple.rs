@@ -18,10 +18,10 @@ use supple_core::{Matrix, RippleTable, Vector};
 
 /// Minimum amplitude of a significant harmonic, in standard deviations.
 const SIGNIFICANT: f64 = 4.0;
-/// The same of a part in proportion to the torque.
+/// Minimum amplitude of a significant harmonic proportional to the torque, in standard deviations.
 const SIGNIFICANT_SHARE: f64 = 3.0;
-/// Lowest harmonic of a torque constant: motors have two pole pairs or more, and at one period per revolution an error of
-/// the friction over the angle looks alike.
+/// Lowest harmonic of a torque constant: motors have at least two pole pairs, and at one period per revolution an error of
+/// the friction over the angle cannot be distinguished from it.
 const FIRST_OF_CONSTANT: u32 = 2;
 /// Number of nuisance columns.
 const NUISANCE: usize = 5;
@@ -45,8 +45,8 @@ impl Default for RippleSearch {
     }
 }
 
-/// Ripple of every motor, from the residual of `fit` over `motions`. All joints must have been identified,
-/// since a motor may drive several.
+/// Identifies the ripple of every motor from the residual of `fit` over `motions`. All joints must have been identified,
+/// because a motor may drive several joints.
 ///
 /// # Errors
 /// Options out of range; fewer slow samples than columns.
@@ -57,11 +57,11 @@ pub fn fit_ripple<const N: usize>(
     search: &RippleSearch,
 ) -> Result<[RippleTable; N], IdentError> {
     positive("fast_rad_per_s", search.fast_rad_per_s)?;
-    if fit.columns.moving().len() != N {
+    if fit.columns.identified_joints().len() != N {
         return Err(crate::error::shape_error(
             "moving",
             format!("all {N} joints, since motors may share them"),
-            format!("{:?}", fit.columns.moving()),
+            format!("{:?}", fit.columns.identified_joints()),
         ));
     }
     let mut tables = [RippleTable::NONE; N];
@@ -94,7 +94,7 @@ pub fn fit_ripple<const N: usize>(
     Ok(tables)
 }
 
-/// Columns and torques of one motor.
+/// Returns columns and torques of one motor.
 fn motor_rows<const N: usize>(
     fit: &Fit<N>,
     motion: &Motion,
@@ -146,7 +146,7 @@ fn motor_rows<const N: usize>(
     if let Some(cutoff_hz) = motion.cutoff_hz {
         columns = LowPass::butterworth4(cutoff_hz, motion.rate_hz)?.zero_phase_columns(&columns)?;
     }
-    // All joints that the motor drives are in slow, steady sliding.
+    // Uses samples in which all joints that the motor drives are in slow, steady sliding.
     let slides = |i: usize| {
         (0..N)
             .filter(|j| joint_from_motor[(*j, motor)] != 0.0)
@@ -198,7 +198,7 @@ fn least_squares(
     })
 }
 
-/// Sine, cosine and amplitude of the harmonic whose columns begin at `first`, and the amplitude in standard deviations.
+/// Returns sine, cosine and amplitude of the harmonic whose columns begin at `first`, and the amplitude in standard deviations.
 fn harmonic_at(solution: &Solution, first: usize) -> (f64, f64, f64, f64) {
     let (sine, cosine) = (solution.x[first], solution.x[first + 1]);
     let deviation = solution.deviation[first].max(solution.deviation[first + 1]);
@@ -206,8 +206,8 @@ fn harmonic_at(solution: &Solution, first: usize) -> (f64, f64, f64, f64) {
     (sine, cosine, amplitude, amplitude / deviation)
 }
 
-/// The largest significant harmonics. What is in proportion to the torque is looked for first, beside everything else;
-/// without significance it is left out, because a torque that hardly varies does not tell it from cogging.
+/// Returns the largest significant harmonics. Harmonics proportional to the torque are tested first, in a fit with all columns;
+/// insignificant ones are removed, because a nearly constant torque does not distinguish them from cogging.
 fn significant(
     a: &DMatrix<f64>,
     b: &DVector<f64>,
@@ -264,7 +264,7 @@ fn significant(
     })
 }
 
-/// Length of two columns together.
+/// Returns the norm of two adjacent columns together.
 fn pair_norm(a: &DMatrix<f64>, first: usize) -> f64 {
     let square = a.columns(first, 2).norm_squared();
     square.sqrt().max(f64::MIN_POSITIVE)

@@ -8,13 +8,14 @@ use supple_core::learned::LearnedTerms;
 use supple_core::{Config, RippleTable};
 use supple_model::{Description, IdentifiedModel, ModelError};
 
-/// Collision threshold over the greatest residual of free motion. Motions that the logs do not contain, faster or with
-/// the arm stretched out, have greater residuals.
+/// Ratio of the collision threshold to the maximum residual of free motion. Motions that the logs do not contain, faster or with
+/// the arm stretched out, have larger residuals.
 pub const RESIDUAL_MARGIN: f64 = 3.0;
-/// Part of the collision threshold over the breakaway torque: where a joint reverses, the dry friction of the model and the
-/// true one may have opposite signs.
+/// Part of the collision threshold, as a multiple of the breakaway torque: when a joint reverses, modelled and true dry friction
+/// may have opposite signs.
 const REVERSAL_MARGIN: f64 = 2.0;
-/// Part of the collision threshold over the joint's torque limit: motions beyond the logs, and what a drive does not resolve.
+/// Part of the collision threshold, as a fraction of the joint's torque limit: for motions beyond the logs and the resolution of
+/// the drive.
 const LIMIT_SHARE: f64 = 0.005;
 
 /// Error of saving a fit.
@@ -29,11 +30,11 @@ pub enum SaveError {
 }
 
 impl<const N: usize> Fit<N> {
-    /// `of` with the identified model: inertias of all links, rotors and friction of the moving joints, and, if they were
-    /// identified, springs, tilt and torque scales as `[learned]` and the compliance of the joints. The fit explains the whole torque of the
-    /// joints that moved: they keep no learned terms and no compliance of `of`, and its payload and tilt, which act on
-    /// several joints, are removed; terms of the other joints stay. All other text is unchanged. `ripple`, if given, replaces
-    /// the motors' tables.
+    /// Returns `of` with the identified model: inertias of all links, rotors and friction of the identified joints, and, if they
+    /// were identified, springs, tilt and torque scales as `[learned]` and the compliance of the joints. The fit explains the
+    /// whole torque of the identified joints; therefore their learned terms and compliance in `of` are removed, and so are its
+    /// payload and tilt, which act on several joints. Terms of the other joints and all other text are unchanged. `ripple`, if
+    /// given, replaces the motors' tables.
     ///
     /// # Errors
     /// [`SaveError`].
@@ -57,7 +58,7 @@ impl<const N: usize> Fit<N> {
             ripple,
             source: &source,
         })?;
-        let moves = |joint: usize| self.columns.moving().contains(&joint);
+        let moves = |joint: usize| self.columns.identified_joints().contains(&joint);
         let found = self.compliance_rad_per_nm();
         let compliance = core::array::from_fn::<f64, N, _>(|joint| match moves(joint) {
             true => found[joint].max(0.0),
@@ -86,8 +87,8 @@ impl<const N: usize> Fit<N> {
         Ok(described.with_learned(&learned, "identified with the model")?)
     }
 
-    /// Collision thresholds for the modes with stiff joint loops: those of [`Fit::collision_nm`], at most the joint's present
-    /// threshold \[N m\].
+    /// Returns the collision thresholds for the modes with stiff joint loops: those of [`Fit::collision_nm`], at most the joint's
+    /// present threshold \[N m\].
     pub fn move_collision_nm(&self, held_out: &[Validation], of: &Config<N>) -> [Option<f64>; N] {
         let mut thresholds = self.collision_nm(held_out, of);
         for (joint, threshold_nm) in thresholds.iter_mut().enumerate() {
@@ -97,13 +98,13 @@ impl<const N: usize> Fit<N> {
         thresholds
     }
 
-    /// The least collision thresholds that the model itself does not exceed, from its residual on held-out motions \[N m\]:
-    /// three times the greatest residual of the joint, twice its breakaway torque at half of its torque limit, and 0.5 % of that
-    /// limit. `None` for a joint that did not move.
+    /// Returns the minimum collision thresholds that errors of the model do not exceed, from its residual on held-out motions
+    /// \[N m\]: three times the maximum residual of the joint, plus twice its breakaway torque at half of its torque limit, plus
+    /// 0.5 % of that limit. `None` for a joint that was not identified.
     pub fn collision_nm(&self, held_out: &[Validation], of: &Config<N>) -> [Option<f64>; N] {
         let friction = self.friction_with(&of.friction);
         let mut thresholds = [None; N];
-        for (row, joint) in self.columns.moving().iter().enumerate() {
+        for (row, joint) in self.columns.identified_joints().iter().enumerate() {
             let peaks = held_out.iter().map(|log| log.peak_nm[row]);
             let peak_nm = peaks.fold(0.0, f64::max);
             let limit_nm = of.limits.joint_torque_nm[*joint];

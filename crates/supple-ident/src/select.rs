@@ -1,9 +1,8 @@
 //! Model selection by cross-validation.
 //!
-//! The log is divided into consecutive parts, the folds; each is predicted from a fit to the others. The candidate with
-//! the fewest columns among those within a tolerance of the smallest error is chosen.
+//! The log is divided into consecutive parts, the folds; each fold is predicted from a fit to the others. Among the candidates
+//! within a tolerance of the smallest error, the one with the fewest columns is selected.
 
-pub use crate::choice::{Candidate, Line, Table};
 use crate::columns::{Columns, FrictionColumns};
 use crate::effects::Effects;
 use crate::error::IdentError;
@@ -12,6 +11,7 @@ use crate::joint_rows::JointRows;
 use crate::motion::Motion;
 use crate::options::{Options, Weights};
 use crate::regressor::joint_rows;
+pub use crate::selection_result::{Candidate, CandidateResult, SelectionTable};
 use supple_core::Arm;
 use supple_core::friction::LoadTorque;
 
@@ -58,7 +58,8 @@ pub fn friction_candidates(base: &Options) -> Vec<Candidate> {
     shapes.into_iter().map(candidate).collect()
 }
 
-/// Coulomb friction independent of load, and growing with either torque on the gear; empty without Coulomb friction.
+/// Coulomb friction independent of load, growing with the joint's load, and growing with the motor's torque; empty without
+/// Coulomb friction.
 pub fn load_candidates(base: &Options) -> Vec<Candidate> {
     if !base.friction.coulomb {
         return Vec::new();
@@ -120,7 +121,7 @@ pub fn weights_candidates(base: &Options) -> Vec<Candidate> {
     .to_vec()
 }
 
-/// No other effects than friction, those of `effects` without compliance, and all of them.
+/// No effects besides friction, those of `effects` without compliance, and all of `effects`.
 pub fn effects_candidates(base: &Options, effects: &Effects) -> Vec<Candidate> {
     let rigid = Effects {
         compliance: false,
@@ -162,24 +163,24 @@ pub fn prior_candidates(base: &Options) -> Vec<Candidate> {
 pub fn compare<const N: usize>(
     nominal: &Arm<N>,
     motions: &[Motion],
-    moving: &[usize],
+    identified_joints: &[usize],
     candidates: &[Candidate],
     parts: usize,
-) -> Result<Table, IdentError> {
+) -> Result<SelectionTable, IdentError> {
     if candidates.is_empty() || parts < 2 {
         return Err(IdentError::Option {
             option: "parts",
             value: parts as f64,
-            must: "2 or more, with at lowest one candidate",
+            must: "2 or more, with at least one candidate",
         });
     }
-    let mut lines = Vec::new();
+    let mut results = Vec::new();
     let mut reason = None;
     for candidate in candidates {
         let options = &candidate.options;
         let columns = Columns::new(
             N,
-            moving,
+            identified_joints,
             options.rotor,
             options.friction,
             &options.couplings,
@@ -187,40 +188,40 @@ pub fn compare<const N: usize>(
         .with_effects(&options.effects);
         let folds = folds(nominal, &columns, motions, parts)?;
         let outcome = held_out(nominal, &columns, &folds, options);
-        // Whatever made a candidate fail, a cancelled comparison has no result.
+        // A cancelled comparison has no result, even if a candidate failed for another reason.
         options.cancellation.check()?;
         let (errors, total) = outcome.unwrap_or_else(|error| {
             reason = Some(error);
             (Vec::new(), f64::INFINITY)
         });
-        lines.push(Line {
+        results.push(CandidateResult {
             candidate: candidate.clone(),
             columns: columns.len(),
             parts: errors,
             total,
         });
     }
-    let lowest = lines
+    let lowest = results
         .iter()
         .map(|line| line.total)
         .fold(f64::INFINITY, f64::min);
     if let (false, Some(reason)) = (lowest.is_finite(), reason) {
         return Err(reason);
     }
-    let good = (0..lines.len()).filter(|i| lines[*i].total <= lowest * (1.0 + TIE));
+    let good = (0..results.len()).filter(|i| results[*i].total <= lowest * (1.0 + TIE));
     let chosen = good.min_by(|a, b| {
-        let (a, b) = (&lines[*a], &lines[*b]);
+        let (a, b) = (&results[*a], &results[*b]);
         a.columns.cmp(&b.columns).then(a.total.total_cmp(&b.total))
     });
-    Ok(Table {
+    Ok(SelectionTable {
         chosen: chosen.unwrap_or(0),
-        lines,
+        candidates: results,
     })
 }
 
 type Fold = Vec<Vec<JointRows>>;
 
-/// The rows of every motion and joint, for each part.
+/// Returns for each fold the rows of every motion and joint.
 fn folds<const N: usize>(
     nominal: &Arm<N>,
     columns: &Columns,
@@ -251,7 +252,7 @@ fn held_out<const N: usize>(
     options: &Options,
 ) -> Result<(Vec<f64>, f64), IdentError> {
     let (mut errors, mut error, mut torque) = (Vec::new(), 0.0, 0.0);
-    // Reduce before the folds are copied: each is used by all fits but one.
+    // Reduce the rows before the folds are copied: each fold is used by all fits but one.
     for rows in folds.iter().flatten().flatten() {
         rows.block(options.slow_rad_per_s);
     }

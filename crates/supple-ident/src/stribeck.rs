@@ -1,4 +1,4 @@
-//! Finds the Stribeck speed whose second-stage fit leaves the smallest residual in slow motion.
+//! Finds the Stribeck speed for which the second-stage fit has the smallest residual in slow motion.
 
 use crate::columns::FrictionColumns;
 use crate::error::IdentError;
@@ -11,7 +11,7 @@ use supple_core::Arm;
 
 /// Candidate Stribeck speeds \[rad/s\].
 const SPEEDS_RAD_PER_S: [f64; 7] = [0.02, 0.03, 0.04, 0.05, 0.07, 0.1, 0.15];
-/// Samples below this speed are used to compare them \[rad/s\].
+/// Maximum speed of the samples used to compare the candidates \[rad/s\].
 const SLOW_RAD_PER_S: f64 = 0.15;
 
 /// Fits viscous and Coulomb friction with offset to the fast samples and the Stribeck effect to the slow ones,
@@ -22,10 +22,11 @@ const SLOW_RAD_PER_S: f64 = 0.15;
 pub fn fit_with_stribeck<const N: usize>(
     nominal: &Arm<N>,
     motions: &[Motion],
-    moving: &[usize],
+    identified_joints: &[usize],
     procedure: &Procedure,
 ) -> Result<Fit<N>, IdentError> {
-    let (procedure, effects) = procedure.with_chosen_effects(nominal, motions, moving)?;
+    let (procedure, effects) =
+        procedure.with_chosen_effects(nominal, motions, identified_joints)?;
     let mut best: Option<(Fit<N>, f64)> = None;
     for speed in SPEEDS_RAD_PER_S {
         let columns = match procedure.friction {
@@ -39,8 +40,8 @@ pub fn fit_with_stribeck<const N: usize>(
             }),
             ..procedure.clone()
         };
-        let options = candidate.options(nominal, motions, moving)?.0;
-        let mut found = fit(nominal, motions, moving, &options)?;
+        let options = candidate.options(nominal, motions, identified_joints)?.0;
+        let mut found = fit(nominal, motions, identified_joints, &options)?;
         found.preparation = procedure.preparation;
         let residual = slow_error(&found, motions)?;
         if best.as_ref().is_none_or(|(_, lowest)| residual < *lowest) {

@@ -17,15 +17,16 @@ pub const POSES: usize = 2000;
 /// Prediction errors of a fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Validation {
-    /// RMS error of each moving joint \[N m\].
+    /// RMS error of each identified joint \[N m\].
     pub rms_nm: Vec<f64>,
-    /// Greatest error of each moving joint \[N m\].
+    /// Greatest error of each identified joint \[N m\].
     pub peak_nm: Vec<f64>,
-    /// `|tau - tau_hat| / |tau|` of each moving joint.
+    /// `|tau - tau_hat| / |tau|` of each identified joint.
     pub relative: Vec<f64>,
-    /// RMS error of each moving joint over the standard deviation of its own torque: 1 explains no more than its mean.
+    /// RMS error of each identified joint divided by the standard deviation of its own torque; at 1 the model explains no more
+    /// than the mean torque.
     pub of_deviation: Vec<f64>,
-    /// Relative error over all moving joints.
+    /// Relative error over all identified joints.
     pub total_relative: f64,
     /// Fraction of random poses, all angles within half a turn, with a positive definite mass matrix.
     pub positive_definite: f64,
@@ -37,8 +38,8 @@ impl<const N: usize> Fit<N> {
     /// # Errors
     /// A log that [`Log::check`] rejects.
     pub fn validate(&self, log: &Log) -> Result<Validation, IdentError> {
-        let moving = self.columns.moving();
-        let (motion, _) = Motion::prepare(log, N, moving, &self.preparation)?;
+        let identified_joints = self.columns.identified_joints();
+        let (motion, _) = Motion::prepare(log, N, identified_joints, &self.preparation)?;
         self.validate_motion(&motion)
     }
 
@@ -77,7 +78,7 @@ impl<const N: usize> Fit<N> {
         })
     }
 
-    /// Predicted torques of the moving joints, (samples, moving joints), with dry friction filtered like the
+    /// Predicted torques of the identified joints, (samples, identified joints), with dry friction filtered like the
     /// measured torques \[N m\].
     ///
     /// # Errors
@@ -85,7 +86,11 @@ impl<const N: usize> Fit<N> {
     pub fn predict_motion(&self, motion: &Motion) -> Result<DMatrix<f64>, IdentError> {
         let joints = joint_rows(self.nominal(), &self.columns, motion)?;
         let mut predicted = DMatrix::zeros(motion.samples(), joints.len());
-        for (row, (joint, measured)) in joints.iter().zip(self.columns.moving()).enumerate() {
+        for (row, (joint, measured)) in joints
+            .iter()
+            .zip(self.columns.identified_joints())
+            .enumerate()
+        {
             // Add the torque of known rotors, which the rows do not include.
             let known = motion.tau.column(*measured) - &joint.b;
             predicted.set_column(row, &(joint.predicted(&self.x) + known));
@@ -105,10 +110,11 @@ impl<const N: usize> Fit<N> {
     }
 }
 
-/// Error of a joint over the deviation of its torque from which its model is poor.
+/// Ratio of a joint's error to the deviation of its torque above which its model counts as poor.
 const POOR_JOINT: f64 = 0.5;
 
-/// Verdict over all held-out logs, as text: the worst log and the worst joint decide. `joints` names the moving joints.
+/// Returns the verdict over all held-out logs as text: the worst log and the worst joint decide. `joints` names the identified
+/// joints.
 pub fn verdict(held_out: &[(String, &Validation)], joints: &[String]) -> String {
     let worst_log = held_out
         .iter()

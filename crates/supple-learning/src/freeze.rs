@@ -1,20 +1,20 @@
-//! When samples may be used.
+//! Conditions in which the samples of a cycle must not be used.
 
 use core::fmt;
 use supple_core::controller::CycleRecord;
 
-/// Why nothing is learned at the moment.
+/// Reason why nothing is learned at the moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Frozen {
+pub enum FreezeReason {
     /// Learning is off.
     Off,
     /// A fault is latched.
     Fault,
-    /// No torque: idle mode, or idle drives.
+    /// No torque acts: idle mode, or idle drives.
     Idle,
-    /// The mode is none in which the arm moves freely by itself.
+    /// In this mode the arm does not move by itself in free space.
     Mode,
-    /// Contact is latched, or its friction share is not yet restored.
+    /// Contact is latched, or the share of the friction feed-forward is not yet restored.
     Contact,
     /// A torque limit or the torque-rate limit cut the command.
     Limited,
@@ -24,43 +24,43 @@ pub enum Frozen {
     Slow,
 }
 
-impl Frozen {
-    /// Why the cycle of `record` must not be used; `None` if it may.
-    pub fn of_cycle<const N: usize>(record: &CycleRecord<N>) -> Option<Frozen> {
+impl FreezeReason {
+    /// Returns the reason why the cycle of `record` must not be used; `None` if it may be used.
+    pub fn of_cycle<const N: usize>(record: &CycleRecord<N>) -> Option<FreezeReason> {
         let mode = record.mode();
         if !record.learning {
-            Some(Frozen::Off)
+            Some(FreezeReason::Off)
         } else if record.fault != 0 {
-            Some(Frozen::Fault)
+            Some(FreezeReason::Fault)
         } else if !record.drives_active {
-            Some(Frozen::Idle)
+            Some(FreezeReason::Idle)
         } else if !mode.is_some_and(|mode| mode.allows_learning()) {
-            Some(Frozen::Mode)
+            Some(FreezeReason::Mode)
         } else if record.in_contact || record.friction_share < 1.0 {
-            Some(Frozen::Contact)
+            Some(FreezeReason::Contact)
         } else if record.torque_limited || record.rate_limited {
-            Some(Frozen::Limited)
+            Some(FreezeReason::Limited)
         } else {
             None
         }
     }
 
-    /// Short name for status lines.
+    /// Returns the short name for status lines.
     pub fn name(self) -> &'static str {
         match self {
-            Frozen::Off => "off",
-            Frozen::Fault => "fault",
-            Frozen::Idle => "idle",
-            Frozen::Mode => "mode",
-            Frozen::Contact => "contact",
-            Frozen::Limited => "torque limit",
-            Frozen::Disturbed => "disturbed",
-            Frozen::Slow => "slow",
+            FreezeReason::Off => "off",
+            FreezeReason::Fault => "fault",
+            FreezeReason::Idle => "idle",
+            FreezeReason::Mode => "mode",
+            FreezeReason::Contact => "contact",
+            FreezeReason::Limited => "torque limit",
+            FreezeReason::Disturbed => "disturbed",
+            FreezeReason::Slow => "slow",
         }
     }
 }
 
-impl fmt::Display for Frozen {
+impl fmt::Display for FreezeReason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
     }

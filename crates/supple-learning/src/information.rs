@@ -1,4 +1,4 @@
-//! Normal equations of one joint: the information of its samples on the unknowns.
+//! Normal equations of one joint: the information that its samples contain about the unknowns.
 
 use crate::prior::unknowns::ALL;
 use crate::rows::Row;
@@ -18,7 +18,7 @@ pub struct Information {
 }
 
 impl Information {
-    /// No samples.
+    /// Creates the sums of no samples.
     pub fn empty() -> Information {
         Information {
             gram: DMatrix::zeros(ALL, ALL),
@@ -28,7 +28,7 @@ impl Information {
         }
     }
 
-    /// Whether there are samples.
+    /// Returns whether there are no samples.
     pub fn is_empty(&self) -> bool {
         self.weight == 0.0
     }
@@ -50,7 +50,7 @@ impl Information {
         self.weight += other.weight;
     }
 
-    /// Keeps a fraction of the samples' weight.
+    /// Multiplies the weight of all samples by `kept`.
     pub fn forget(&mut self, kept: f64) {
         self.gram *= kept;
         self.right *= kept;
@@ -58,14 +58,14 @@ impl Information {
         self.weight *= kept;
     }
 
-    /// Mean square of the error that `unknowns` leave \[N^2 m^2\].
+    /// Returns the mean square of the error that remains with these `unknowns` \[N^2 m^2\].
     pub fn mean_square(&self, unknowns: &DVector<f64>) -> f64 {
         let sum =
             self.square - 2.0 * self.right.dot(unknowns) + unknowns.dot(&(&self.gram * unknowns));
         (sum / self.weight).max(0.0)
     }
 
-    /// Mean square of the torque that `covariance` of the unknowns leaves uncertain \[N^2 m^2\].
+    /// Returns the mean square of the torque uncertainty that follows from the `covariance` of the unknowns \[N^2 m^2\].
     pub fn mean_variance(&self, covariance: &DMatrix<f64>) -> f64 {
         (self.gram.component_mul(covariance)).sum() / self.weight
     }

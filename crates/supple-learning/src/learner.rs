@@ -1,6 +1,6 @@
-//! From records to requests.
+//! The learner, which converts records of control cycles to requests with learned parameters.
 
-use crate::freeze::Frozen;
+use crate::freeze::FreezeReason;
 use crate::information::Information;
 use crate::prior::Prior;
 use crate::prior::unknowns::VISCOUS;
@@ -13,7 +13,7 @@ use supple_core::learned::LearnedTerms;
 use supple_core::math::exp;
 use supple_core::{Config, Friction};
 
-/// When a joint gives equations: what its dry friction does in a reversal is not identifiable.
+/// Condition for the use of a joint's equations: near a reversal the dry friction is not identifiable.
 #[derive(Clone, Copy, Debug)]
 struct SpeedGate {
     /// Minimum speed \[rad/s\].
@@ -27,7 +27,7 @@ impl SpeedGate {
         min_rad_per_s: 0.08,
         settle_s: 0.15,
     };
-    /// Where the travel of a reversal is known, the equations follow it.
+    /// Condition with a known presliding distance, for which the equations model the reversal.
     const WITH_PRESLIDING: SpeedGate = SpeedGate {
         min_rad_per_s: 0.02,
         settle_s: 0.05,
@@ -42,36 +42,36 @@ impl SpeedGate {
     }
 }
 
-/// Time over which equations are averaged to a sample \[s\]. The noise of the velocity is that of a difference quotient:
-/// little of it is left in the mean, much in single cycles.
+/// Time over which equations are averaged to a sample \[s\]. The velocity is a difference quotient: its noise is large in single
+/// cycles and small in the mean.
 const SAMPLE_S: f64 = 0.05;
 /// Time over which errors of the model are correlated: one sample of this time is independent \[s\].
 const CORRELATION_S: f64 = 0.2;
-/// Samples are collected, judged and used by intervals of this length \[s\].
+/// Length of the intervals in which samples are collected, checked and used \[s\].
 const INTERVAL_S: f64 = 0.25;
-/// Intervals for which samples wait: a freeze meanwhile discards them.
+/// Number of intervals for which samples wait before they are used; a freeze during this time discards them.
 const WAITING: usize = 2;
 /// Time after a freeze in which no samples are collected \[s\].
 const AFTER_FREEZE_S: f64 = 0.5;
-/// Time constant of forgetting, in time of motion \[s\]. A longer memory gives errors that no unknown explains more weight
-/// than the prior.
+/// Time constant of forgetting, in time of motion \[s\]. With a longer memory, errors that no unknown explains would have more
+/// weight than the prior.
 const FORGET_S: f64 = 30.0;
 /// An interval is disturbed if its error is greater than this multiple of its standard deviation.
 const DISTURBED: f64 = 4.0;
-/// Time of unexplained torque in free motion after which it is taken for a change of the arm \[s\].
+/// Time of unexplained torque in free motion after which the learner assumes that the arm has changed \[s\].
 const PERSISTENT_S: f64 = 20.0;
-/// Weight that older samples keep then.
+/// Factor of the weight of older samples after such a change.
 const KEPT_AFTER_CHANGE: f64 = 0.02;
 /// Time between estimates \[s\].
 const SOLVE_S: f64 = 2.0;
-/// Time from the last sample of an estimate until it comes into force, and the least number of cycles, which no queue
-/// between controller and learner exceeds: the cycle does not depend on the speed of either.
+/// Time from the last sample of an estimate until the controller applies the estimate, and its minimum in cycles. Queues between
+/// controller and learner are shorter, so that the cycle of application does not depend on the speed of either.
 const LATENCY_S: f64 = 2.0;
 const MIN_LATENCY_CYCLES: u64 = 2500;
 /// Time constant of the measured residual, in intervals.
 const RESIDUAL_INTERVALS: f64 = 40.0;
 
-/// A request with the cycle in which it is to be carried out.
+/// A request with the cycle in which the controller must execute it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scheduled<const N: usize> {
     /// Cycle.
@@ -87,13 +87,13 @@ pub struct Learner<const N: usize> {
     period_s: f64,
     rows: Rows<N>,
     last_cycle: Option<u64>,
-    /// Time since the filters of all joints, and of each joint, may be relied on \[s\].
+    /// Time since the last freeze, and for each joint time since it was last slow or reversed \[s\].
     since_freeze_s: f64,
     since_slow_s: [f64; N],
-    /// Filtered velocity of the cycle before \[rad/s\].
+    /// Filtered velocity of the previous cycle \[rad/s\].
     last_velocity_rad_per_s: [f64; N],
     speed_gate: [SpeedGate; N],
-    /// Sum of each joint's equations since the last sample, and their number; `None` once one of them may not be used.
+    /// Sum of each joint's equations since the last sample, and their number; `None` if one of these equations must not be used.
     sums: Vec<Option<Row>>,
     summed: u32,
     cycles_per_sample: u32,
@@ -103,16 +103,16 @@ pub struct Learner<const N: usize> {
     samples: Vec<Information>,
     estimate: Option<Estimate>,
     since_solve_s: f64,
-    has_news: bool,
-    /// Measured variance of what the estimate leaves \[N^2 m^2\].
+    has_new_samples: bool,
+    /// Measured variance of the residual torque of the estimate \[N^2 m^2\].
     residual: [f64; N],
     disturbed_s: f64,
     disturbances: u64,
-    frozen: Option<Frozen>,
+    frozen: Option<FreezeReason>,
 }
 
 impl<const N: usize> Learner<N> {
-    /// Of the controller with this configuration, before its first cycle.
+    /// Creates the learner of a controller with this configuration, before its first cycle.
     pub fn new(config: &Config<N>) -> Learner<N> {
         let prior = Prior::new(config);
         Learner {
@@ -132,26 +132,26 @@ impl<const N: usize> Learner<N> {
             waiting: VecDeque::new(),
             samples: vec![Information::empty(); N],
             since_solve_s: 0.0,
-            has_news: false,
+            has_new_samples: false,
             residual: [0.0; N],
             disturbed_s: 0.0,
             disturbances: 0,
-            frozen: Some(Frozen::Off),
+            frozen: Some(FreezeReason::Off),
             prior,
         }
     }
 
-    /// Forgets all samples: the estimate is the prior again.
+    /// Forgets all samples and resets the estimate to the prior.
     pub fn reset(&mut self) {
         self.samples = vec![Information::empty(); N];
         self.estimate = of_prior(&self.prior);
         self.residual = [0.0; N];
         self.disturbed_s = 0.0;
-        self.has_news = false;
+        self.has_new_samples = false;
         self.discard();
     }
 
-    /// What is known.
+    /// Returns the present estimates.
     pub fn report(&self) -> Report<N> {
         let zero = LearnedTerms::zero();
         let of = |part: fn(&Estimate) -> LearnedTerms<N>| self.estimate.as_ref().map_or(zero, part);
@@ -167,7 +167,7 @@ impl<const N: usize> Learner<N> {
         }
     }
 
-    /// Takes the record of a cycle; returns the requests that an estimate leads to, mostly none.
+    /// Processes the record of a cycle; returns the requests of a new estimate, in most cycles none.
     pub fn observe(&mut self, record: &CycleRecord<N>) -> Vec<Scheduled<N>> {
         use supple_core::codes::request_kind;
         if record.request == request_kind::LEARNING
@@ -183,7 +183,7 @@ impl<const N: usize> Learner<N> {
             self.rows.restart();
             self.freeze();
         }
-        let rows = self.rows.cycle(record);
+        let rows = self.rows.add_cycle(record);
         self.since_freeze_s += self.period_s;
         for (i, since) in self.since_slow_s.iter_mut().enumerate() {
             let velocity = rows[i].columns[VISCOUS];
@@ -196,7 +196,7 @@ impl<const N: usize> Learner<N> {
                 *since = 0.0;
             }
         }
-        match Frozen::of_cycle(record) {
+        match FreezeReason::of_cycle(record) {
             Some(frozen) => {
                 self.frozen = Some(frozen);
                 self.freeze();
@@ -212,15 +212,15 @@ impl<const N: usize> Learner<N> {
             self.end_interval();
         }
         self.since_solve_s += self.period_s;
-        if self.since_solve_s < SOLVE_S || !self.has_news {
+        if self.since_solve_s < SOLVE_S || !self.has_new_samples {
             return Vec::new();
         }
         self.since_solve_s = 0.0;
-        self.has_news = false;
+        self.has_new_samples = false;
         self.requests(cycle)
     }
 
-    /// Samples of the joints that move: mean equations of the cycles since the last sample.
+    /// Adds a cycle to the samples of the joints that move. A sample is the mean equation of the cycles since the last sample.
     fn collect(&mut self, rows: &[Row]) {
         for (i, (sum, row)) in self.sums.iter_mut().zip(rows).enumerate() {
             if self.since_slow_s[i] < self.speed_gate[i].settle_s {
@@ -264,17 +264,17 @@ impl<const N: usize> Learner<N> {
         self.since_freeze_s = 0.0;
     }
 
-    /// Judges the samples of an interval, and uses those that have waited.
+    /// Checks the samples of an interval for disturbances, and uses the samples that have waited.
     fn end_interval(&mut self) {
         let interval = core::mem::replace(&mut self.collecting, vec![Information::empty(); N]);
         if interval.iter().all(Information::is_empty) {
-            self.frozen = Some(Frozen::Slow);
+            self.frozen = Some(FreezeReason::Slow);
             return;
         }
         if self.is_disturbed(&interval) {
             self.disturbances += 1;
             self.disturbed_s += INTERVAL_S + AFTER_FREEZE_S;
-            self.frozen = Some(Frozen::Disturbed);
+            self.frozen = Some(FreezeReason::Disturbed);
             self.freeze();
             if self.disturbed_s >= PERSISTENT_S {
                 self.accept_change(&interval);
@@ -282,7 +282,7 @@ impl<const N: usize> Learner<N> {
             return;
         }
         self.frozen = None;
-        // In some intervals of a motion a lasting change hardly shows: they do not disprove it.
+        // In some intervals a lasting change causes almost no error, so an undisturbed interval does not reset the time.
         self.disturbed_s = (self.disturbed_s - INTERVAL_S).max(0.0);
         self.waiting.push_back(interval);
         if self.waiting.len() > WAITING
@@ -305,8 +305,8 @@ impl<const N: usize> Learner<N> {
         })
     }
 
-    /// The arm has changed: what was learned before counts for little, and an error as large as in this interval is no
-    /// disturbance until less is left of it.
+    /// Adapts to a change of the arm: reduces the weight of older samples, and raises the expected residual so that an error as
+    /// large as in this interval is no disturbance until the residual has decreased.
     fn accept_change(&mut self, interval: &[Information]) {
         self.disturbed_s = 0.0;
         if let Some(estimate) = &self.estimate {
@@ -338,10 +338,10 @@ impl<const N: usize> Learner<N> {
                     ((square - known).max(0.0) - self.residual[i]) / RESIDUAL_INTERVALS;
             }
         }
-        self.has_news = true;
+        self.has_new_samples = true;
     }
 
-    /// A new estimate as requests, all for cycles that the learner's delay cannot reach.
+    /// Returns a new estimate as requests, all for a cycle later than the learner's maximum delay.
     fn requests(&mut self, cycle: u64) -> Vec<Scheduled<N>> {
         let Some(estimate) = solve(&self.prior, &self.samples) else {
             return Vec::new();

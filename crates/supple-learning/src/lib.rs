@@ -3,18 +3,18 @@
 //! A [`Learner`] is given the record of every control cycle. It compares the commanded torque with the torque that the
 //! model needs for the measured motion, and estimates what explains the difference: friction, payload, base tilt, torque
 //! offsets, torque constants, and a smooth map of the rest over each joint's angle and direction of motion
-//! ([`supple_core::learned`]). What it finds it returns as requests to the controller, each for a given cycle. It reads
+//! ([`supple_core::learned`]). It returns its estimates as requests to the controller, each for a given cycle. It reads
 //! no clock and no file: the same records give the same requests, bit for bit.
 //!
 //! The tracking error is not used: at low gains, adapting to it makes tracking worse.
 //!
 //! **Prediction error** ([`rows`]). Torque and model pass the same filters, in the form of the generalised momentum,
 //! so that no acceleration is differentiated.
-//! **Estimate** ([`solve`]). Recursive least squares with a Gaussian prior around the model and with forgetting: where
-//! the motion excites nothing, the model's value stays. Each number stays within its box,
+//! **Estimate** ([`solve`]). Recursive least squares with a Gaussian prior around the model and with forgetting: a parameter that
+//! the motion does not excite keeps the model's value. Each number stays within its bounds,
 //! [`supple_core::learned::LearnedBounds`].
-//! **Freeze** ([`Frozen`]). Contact, faults, idle drives, torque limits, modes in which people push, and torques that
-//! the present uncertainty does not explain. Samples are used only if nothing of that follows within half a second.
+//! **Freeze** ([`FreezeReason`]). Contact, faults, idle drives, torque limits, modes in which people push, and torques that
+//! the present uncertainty does not explain. Samples are used only if none of these follows within half a second.
 
 #![forbid(unsafe_code)]
 
@@ -26,7 +26,7 @@ mod report;
 pub mod rows;
 pub mod solve;
 
-pub use freeze::Frozen;
+pub use freeze::FreezeReason;
 pub use learner::{Learner, Scheduled};
 pub use prior::{Prior, unknowns};
 pub use report::Report;

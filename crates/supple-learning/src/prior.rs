@@ -1,10 +1,10 @@
-//! The unknowns, and what is known of them before any motion.
+//! The unknowns and their prior before any motion.
 
 use nalgebra::{DMatrix, DVector};
 use supple_core::Config;
 use supple_core::learned::{JointMap, LearnedBounds, LearnedParameters, LearnedTerms, MAP_KNOTS};
 
-/// Order of the unknowns in a joint's equations: those of the joint, then those that all joints share.
+/// Order of the unknowns in a joint's equations: the joint's own unknowns, then the unknowns that all joints share.
 pub mod unknowns {
     use super::MAP_KNOTS;
 
@@ -36,17 +36,17 @@ pub mod unknowns {
 use unknowns::{ALL, COULOMB, JOINT, MAP_DRY, MAP_TORQUE, MOMENT, OFFSET, PAYLOAD, SCALE, SHARED};
 use unknowns::{TILT, VISCOUS};
 
-/// Standard deviation of the prior over the bound: of a payload, a tilt, an offset, friction and torque scale.
+/// Standard deviation of the prior relative to the bound, for payload, tilt, friction and torque scale.
 const PRIOR_SHARE: f64 = 0.4;
-/// The same of an offset, which a payload and a tilt explain as well.
+/// The same ratio for an offset, which payload and tilt can explain as well.
 const OFFSET_SHARE: f64 = 0.05;
-/// The same of the map's part over the angle alone.
+/// The same ratio for the map's part that depends on the angle alone.
 const MAP_TORQUE_SHARE: f64 = 0.05;
-/// The same of the map's part against the motion, over the Coulomb friction.
+/// Standard deviation of the map's part against the motion, relative to the Coulomb friction.
 const MAP_DRY_SHARE: f64 = 0.2;
-/// Standard deviation of the map's second differences over that of its coefficients: how smooth it is.
+/// Standard deviation of the map's second differences relative to that of its coefficients, which determines its smoothness.
 const SMOOTHNESS: f64 = 0.5;
-/// Smallest standard deviation that counts, so that no precision is infinite.
+/// Minimum standard deviation, so that no precision is infinite.
 const MIN_STD: f64 = 1e-9;
 /// Share of the dry friction, and of the torque limit, in the noise of a joint's torque.
 const NOISE_FRICTION_SHARE: f64 = 0.1;
@@ -63,16 +63,16 @@ pub struct Prior<const N: usize> {
     pub joint_mean: Vec<DVector<f64>>,
     /// Prior mean of the shared unknowns.
     pub shared_mean: DVector<f64>,
-    /// Bound of each joint's own unknowns, either way.
+    /// Bound of the magnitude of each joint's own unknowns.
     pub joint_bound: Vec<DVector<f64>>,
-    /// Bound of the shared unknowns.
+    /// Bound of the magnitude of the shared unknowns.
     pub shared_bound: DVector<f64>,
     /// Standard deviation of the filtered torque of each joint \[N m\].
     pub noise_nm: [f64; N],
 }
 
 impl<const N: usize> Prior<N> {
-    /// Around the learned terms that the configuration begins with.
+    /// Creates the prior around the initial learned terms of the configuration.
     pub fn new(config: &Config<N>) -> Prior<N> {
         let limits = &config.limits;
         let bounds = LearnedBounds::new(&config.friction, &limits.joint_torque_nm);
@@ -137,7 +137,7 @@ fn joint_precision(bound: &DVector<f64>, coulomb_nm: f64) -> DMatrix<f64> {
     matrix
 }
 
-/// A joint's own unknowns.
+/// Returns a joint's own unknowns.
 pub(crate) fn joint_of<const N: usize>(terms: &LearnedTerms<N>, joint: usize) -> DVector<f64> {
     let parameters = &terms.parameters;
     let first = [
@@ -150,7 +150,7 @@ pub(crate) fn joint_of<const N: usize>(terms: &LearnedTerms<N>, joint: usize) ->
     DVector::from_iterator(JOINT, all)
 }
 
-/// The shared unknowns.
+/// Returns the shared unknowns.
 pub(crate) fn shared_of<const N: usize>(parameters: &LearnedParameters<N>) -> DVector<f64> {
     let moment = &parameters.payload_moment_kg_m;
     let tilt = &parameters.tilt_rad;
@@ -160,7 +160,7 @@ pub(crate) fn shared_of<const N: usize>(parameters: &LearnedParameters<N>) -> DV
     DVector::from_iterator(SHARED, all.copied())
 }
 
-/// The terms of these unknowns.
+/// Returns the learned terms of these unknowns.
 pub(crate) fn terms_of<const N: usize>(
     joints: &[DVector<f64>],
     shared: &DVector<f64>,

@@ -1,28 +1,28 @@
-//! What a learner has estimated.
+//! Report of a learner's estimates.
 
-use crate::freeze::Frozen;
+use crate::freeze::FreezeReason;
 use supple_core::Vector;
 use supple_core::learned::LearnedTerms;
 
 /// State of a learner.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Report<const N: usize> {
-    /// Estimated terms; those in force follow them with a delay.
+    /// Estimated terms; the controller applies them with a delay.
     pub terms: LearnedTerms<N>,
-    /// Standard deviation of each, as far as the prior and the noise model go.
+    /// Standard deviation of each term, according to the prior and the noise model.
     pub deviations: LearnedTerms<N>,
-    /// Time of motion that each joint's samples weigh, after forgetting \[s\].
+    /// Weight of each joint's samples as time of motion, after forgetting \[s\].
     pub learned_s: [f64; N],
     /// Root mean square of the torque that the terms leave unexplained, by joint \[N m\]; zero without samples.
     pub residual_nm: [f64; N],
     /// Number of intervals that were rejected because a torque acted that the uncertainty does not explain.
     pub disturbances: u64,
-    /// Why nothing is learned at the moment.
-    pub frozen: Option<Frozen>,
+    /// Reason why nothing is learned at the moment.
+    pub frozen: Option<FreezeReason>,
 }
 
 impl<const N: usize> Report<N> {
-    /// Where the terms come from, with their uncertainty, for the TOML of an arm.
+    /// Returns the source of the terms, with their uncertainty, for the TOML of an arm.
     pub fn source(&self) -> String {
         let with_deviation = |value: Vector<N>, deviation: Vector<N>| {
             let each = value.iter().zip(&deviation);

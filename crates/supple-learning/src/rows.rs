@@ -6,11 +6,11 @@
 //! F[p' - C^T qd + G + D] = b (p - F p) + F[G + D - C^T qd]
 //! ```
 //!
-//! (`b` the gain that makes the first term the filtered difference of `p`). What the filtered command has beyond it is
-//! the prediction error; the columns of the unknowns pass `F` too. Before that, command and angle pass the filter whose
-//! derivative the velocity estimate is, so that angle, velocity and torque belong to the same time; the command is
-//! delayed as the drives delay it. Dry friction has the direction of [`Friction::direction_after`] where the travel of a
-//! reversal is known, else that of the velocity.
+//! (with the gain `b` the first term is the filtered difference of `p`). The filtered command minus this torque is
+//! the prediction error; the columns of the unknowns pass `F` too. Before `F`, command and angle pass the filter whose
+//! derivative is the velocity estimate, so that angle, velocity and torque belong to the same time; the command is
+//! delayed by the delay of the drives. Dry friction has the direction of [`Friction::direction_after`] if the presliding distance
+//! is known, otherwise the direction of the velocity.
 //!
 //! [`Friction::direction_after`]: supple_core::Friction::direction_after
 
@@ -27,7 +27,7 @@ use supple_core::{Config, Friction, Vector};
 
 /// Bandwidth of the filter `F` \[rad/s\].
 pub const FILTER_RAD_PER_S: f64 = 40.0;
-/// Cycles from a command to the torque of the drives.
+/// Delay from a command to the torque of the drives, in cycles.
 pub const DRIVE_DELAY_CYCLES: usize = 1;
 
 /// One equation: `columns . unknowns = error_nm`.
@@ -35,7 +35,7 @@ pub const DRIVE_DELAY_CYCLES: usize = 1;
 pub struct Row {
     /// Columns, in the order of [`crate::unknowns`].
     pub columns: [f64; ALL],
-    /// Commanded torque beyond the model's \[N m\].
+    /// Commanded torque minus the model's torque \[N m\].
     pub error_nm: f64,
 }
 
@@ -85,7 +85,7 @@ pub struct Rows<const N: usize> {
 }
 
 impl<const N: usize> Rows<N> {
-    /// Filters before the first cycle.
+    /// Creates the filters before the first cycle.
     pub fn new(config: &Config<N>) -> Rows<N> {
         let gain = |rad_per_s: f64| 1.0 - exp(-rad_per_s * config.period_s);
         Rows {
@@ -106,16 +106,16 @@ impl<const N: usize> Rows<N> {
         }
     }
 
-    /// Forgets all cycles; the filters have settled again after some of their time constants.
+    /// Forgets all cycles; the filters settle again after some of their time constants.
     pub fn restart(&mut self) {
         self.started = false;
     }
 
     /// Passes a cycle through the filters; returns the equations of all joints.
-    pub fn cycle(&mut self, record: &CycleRecord<N>) -> Vec<Row> {
+    pub fn add_cycle(&mut self, record: &CycleRecord<N>) -> Vec<Row> {
         let velocity = &record.velocity_rad_per_s;
         let first = !self.started;
-        // The compensation of the ripple is not part of the model's torque: what it cancels is not either.
+        // The model's torque contains neither the torque ripple nor its compensation.
         let command = record.torque_nm - record.torques.ripple;
         if first {
             self.started = true;
@@ -158,7 +158,7 @@ impl<const N: usize> Rows<N> {
             self.tip_velocity = tip_velocity;
         }
         let a = self.filter;
-        // The filtered difference quotient of a quantity whose filtered value is subtracted from it.
+        // The quantity minus its filtered value gives its filtered difference quotient.
         let rate = a / ((1.0 - a) * config.period_s);
         self.momentum += (self.terms.momentum - self.momentum) * a;
         self.model += (model - self.model) * a;
@@ -192,7 +192,7 @@ impl<const N: usize> Rows<N> {
         rows
     }
 
-    /// Columns before the filter, but for the inertia of the payload and the torque scale.
+    /// Returns the columns before the filter, without the inertia of the payload and without the torque scale.
     fn columns_now(&self, q: &Vector<N>, velocity: &Vector<N>) -> Vec<[f64; ALL]> {
         let config = &self.config;
         let gravity = config.arm.gravity();
@@ -228,7 +228,7 @@ impl<const N: usize> Rows<N> {
     }
 }
 
-/// Torques of a unit of mass and of each unit of its first moment.
+/// Returns the torques of a unit mass, and of each unit of its first moment.
 fn payload_columns<const N: usize>(
     terms: &Terms<N>,
     force_n_per_kg: &Vector3<f64>,

@@ -2,7 +2,7 @@
 //!
 //! Joints have only the payload and the tilt in common, so that each joint's own unknowns `x` are eliminated first:
 //! with `L x + C y = l` for each joint, the shared unknowns `y` solve `(S - sum C^T L^-1 C) y = s - sum C^T L^-1 l`.
-//! An unknown beyond its bound is fixed there, and the rest is solved again.
+//! An unknown beyond its bound is fixed at the bound, and the other unknowns are solved again.
 
 use crate::information::Information;
 use crate::prior::unknowns::{ALL, JOINT, SHARED};
@@ -10,9 +10,9 @@ use crate::prior::{Prior, joint_of, shared_of};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use supple_core::learned::LearnedTerms;
 
-/// Times that further unknowns are fixed at their bounds.
+/// Maximum number of solutions with further unknowns fixed at their bounds.
 const ROUNDS: usize = 8;
-/// Precision of a fixed unknown over that of its bound.
+/// Precision of a fixed unknown relative to the precision of its bound.
 const FIXED: f64 = 1e12;
 
 /// An estimate of all unknowns.
@@ -27,12 +27,12 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    /// The learned terms.
+    /// Returns the learned terms.
     pub fn terms<const N: usize>(&self) -> LearnedTerms<N> {
         crate::prior::terms_of(&self.joints, &self.shared)
     }
 
-    /// Unknowns of the equations of a joint.
+    /// Returns the unknowns of the equations of a joint.
     pub fn unknowns(&self, joint: usize) -> DVector<f64> {
         let mut all = DVector::zeros(ALL);
         all.rows_mut(0, JOINT).copy_from(&self.joints[joint]);
@@ -40,7 +40,7 @@ impl Estimate {
         all
     }
 
-    /// Standard deviations of the parameters; those of the map are left out.
+    /// Returns the standard deviations of the parameters; those of the map are zero.
     pub fn deviations<const N: usize>(&self) -> LearnedTerms<N> {
         let root = |joint: usize, first: usize, count: usize| {
             let covariance = &self.covariance[joint];
@@ -53,10 +53,10 @@ impl Estimate {
     }
 }
 
-/// Unknowns that are fixed at a value.
+/// Unknowns that are fixed, with their values.
 type Fixed = Vec<Option<f64>>;
 
-/// Solves for all unknowns. `None` if the equations are not positive definite, as if a number in them is not finite.
+/// Solves for all unknowns. `None` if the equations are not positive definite, for example because a number is not finite.
 pub fn solve<const N: usize>(prior: &Prior<N>, samples: &[Information]) -> Option<Estimate> {
     let mut joint_fixed: Vec<Fixed> = vec![vec![None; JOINT]; N];
     let mut shared_fixed: Fixed = vec![None; SHARED];
@@ -79,13 +79,13 @@ pub fn solve<const N: usize>(prior: &Prior<N>, samples: &[Information]) -> Optio
     (finite(&estimate.shared) && estimate.joints.iter().all(finite)).then_some(estimate)
 }
 
-/// The estimate before any sample.
+/// Returns the estimate before any sample.
 pub fn of_prior<const N: usize>(prior: &Prior<N>) -> Option<Estimate> {
     solve(prior, &vec![Information::empty(); N])
 }
 
-/// The estimate that these terms are, with the covariance of another.
-pub fn at_terms<const N: usize>(estimate: &Estimate, terms: &LearnedTerms<N>) -> Estimate {
+/// Returns an estimate with these terms, and with the covariance of another estimate.
+pub fn with_terms<const N: usize>(estimate: &Estimate, terms: &LearnedTerms<N>) -> Estimate {
     Estimate {
         joints: (0..N).map(|joint| joint_of(terms, joint)).collect(),
         shared: shared_of(&terms.parameters),
@@ -93,7 +93,7 @@ pub fn at_terms<const N: usize>(estimate: &Estimate, terms: &LearnedTerms<N>) ->
     }
 }
 
-/// Fixes what is beyond its bound; returns whether there was any.
+/// Fixes the unknowns that are beyond their bounds; returns whether there are any.
 fn fix(x: &DVector<f64>, bound: &DVector<f64>, fixed: &mut Fixed) -> bool {
     let mut any = false;
     for (k, fixed) in fixed.iter_mut().enumerate() {

@@ -19,7 +19,10 @@ pub(crate) fn decode<'a, T: Deserialize<'a>>(data: &'a [u8]) -> Result<T, String
     let (value, read) =
         cdr_encoding::from_bytes::<T, LittleEndian>(values).map_err(|error| error.to_string())?;
     if read != values.len() {
-        return Err(format!("{} bytes, expected {read}", values.len()));
+        return Err(format!(
+            "the message has {} bytes, expected {read}",
+            values.len()
+        ));
     }
     Ok(value)
 }

@@ -1,7 +1,7 @@
 //! The active configuration as TOML, bit-exact in both directions: numbers are printed with enough digits.
 //!
-//! It may differ from the TOML of the arm: a perturbed or identified model, other gains, another law. Links are
-//! in joint frames, as in [`Arm::links`].
+//! The active configuration may differ from the TOML of the arm: a perturbed or identified model, other gains, another law.
+//! Links are in joint frames, as in [`Arm::links`].
 
 use crate::toml_types::{
     CollisionDef, ContactLatchDef, FrictionDef, JointGainsDef, LawDef, LimitsDef, LinkDef,
@@ -19,7 +19,7 @@ use supple_model::LearnedSettings;
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Stored<const N: usize> {
+struct StoredConfig<const N: usize> {
     period_s: f64,
     estimator_rad_per_s: f64,
     handover_s: f64,
@@ -66,12 +66,12 @@ struct Stored<const N: usize> {
     plausible: PlausibilityLimits,
     #[serde(default)]
     workspace: Option<WorkspaceDef>,
-    joints: Vec<Joint>,
+    joints: Vec<StoredJoint>,
 }
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Joint {
+struct StoredJoint {
     /// Older logs have no names here.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     name: String,
@@ -110,7 +110,7 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         plausible,
         workspace,
     } = *config;
-    let stored = Stored {
+    let stored = StoredConfig {
         period_s,
         estimator_rad_per_s,
         handover_s,
@@ -134,7 +134,7 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
         plausible,
         workspace: Some(WorkspaceDef::new(&workspace)),
         joints: (0..N)
-            .map(|i| Joint {
+            .map(|i| StoredJoint {
                 name: joint_names.as_slice()[i].as_str().to_owned(),
                 armature_kg_m2: arm.armature()[i],
                 role: roles[i],
@@ -149,13 +149,19 @@ pub(crate) fn to_toml<const N: usize>(config: &Config<N>) -> Result<String, toml
 /// # Errors
 /// Description of the problem.
 pub(crate) fn from_toml<const N: usize>(text: &str) -> Result<Config<N>, String> {
-    // By way of a table, whose deserializer compiles to less code for each number of joints than that of text.
+    // Parse into a table first: for each number of joints, the deserializer of tables compiles to less code than that of text.
     let table: toml::Table = toml::from_str(text).map_err(|error| error.to_string())?;
-    let stored: Stored<N> = table.try_into().map_err(|error| error.to_string())?;
-    let joints: [Joint; N] = stored
-        .joints
-        .try_into()
-        .map_err(|joints: Vec<Joint>| format!("{} joints, expected {N}", joints.len()))?;
+    let stored: StoredConfig<N> = table.try_into().map_err(|error| error.to_string())?;
+    let joints: [StoredJoint; N] =
+        stored
+            .joints
+            .try_into()
+            .map_err(|joints: Vec<StoredJoint>| {
+                format!(
+                    "the configuration has {} joints, expected {N}",
+                    joints.len()
+                )
+            })?;
     let arm = Arm::from_links(
         joints.each_ref().map(|joint| joint.link),
         Vector::from_fn(|i, _| joints[i].armature_kg_m2),
@@ -176,7 +182,12 @@ pub(crate) fn from_toml<const N: usize>(text: &str) -> Result<Config<N>, String>
         },
         compliance_rad_per_nm: match &stored.compliance_rad_per_nm {
             Some(values) if values.len() == N => Vector::from_column_slice(values),
-            Some(values) => return Err(format!("{} compliances of {N} joints", values.len())),
+            Some(values) => {
+                return Err(format!(
+                    "compliance_rad_per_nm has {} values for {N} joints",
+                    values.len()
+                ));
+            }
             None => Vector::zeros(),
         },
         period_s: stored.period_s,
@@ -220,14 +231,14 @@ mod tests {
     }
 
     #[test]
-    fn every_built_in_arm_survives_the_round_trip_bit_exactly() {
+    fn the_configuration_of_every_built_in_arm_is_read_back_bit_exactly() {
         round_trip(&config::<3>("paper3"));
         round_trip(&config::<4>("wam4"));
         round_trip(&config::<7>("wam7"));
     }
 
     #[test]
-    fn every_option_of_the_law_survives_the_round_trip() {
+    fn every_option_of_the_law_is_read_back_bit_exactly() {
         let mut config = config::<4>("wam4");
         config.law.inertia = ApparentInertia::Chosen(Matrix3::new(
             2.0,

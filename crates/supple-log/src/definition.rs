@@ -121,12 +121,12 @@ impl Definitions {
     }
 }
 
-/// The definitions in `text`, whose first is that of `root`. `package/msg/Type` is `package/Type`.
+/// Parses the definitions in `text`; the first is that of `root`. `package/msg/Type` equals `package/Type`.
 pub(crate) fn parse(root: &str, text: &str) -> Result<Definitions, String> {
     if text.len() > MAX_BYTES {
         let bytes = text.len();
         return Err(format!(
-            "a definition of {bytes} bytes, at most {MAX_BYTES} are read"
+            "a message definition has {bytes} bytes, the maximum is {MAX_BYTES}"
         ));
     }
     let root = root.replace("/msg/", "/");
@@ -161,12 +161,12 @@ pub(crate) fn fields(name: &str, body: &str) -> Result<Vec<Field>, String> {
         .collect()
 }
 
-/// `type NAME=value`; `<=` belongs to a type.
+/// Returns whether a line defines a constant, `type NAME=value`; `<=` belongs to a type.
 fn is_constant(line: &str) -> bool {
     line.replace("<=", "").contains('=')
 }
 
-/// `type name`, with an optional default value.
+/// Parses a field, `type name`, with an optional default value.
 fn field(package: &str, line: &str) -> Option<Field> {
     let mut words = line.split_whitespace();
     let (of, name) = (words.next()?, words.next()?);

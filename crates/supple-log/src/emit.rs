@@ -1,4 +1,4 @@
-//! The messages of a step, for a log and for a live viewer alike.
+//! Creates the messages of a step, for logs and for live viewers.
 
 use crate::error::LogError;
 use crate::messages::{
@@ -16,21 +16,21 @@ use supple_model::Description;
 
 /// Steps between two messages on `/tf`.
 pub(crate) const TF_EVERY: u64 = 20;
-/// Frame at the tip with the axes of the base: the wrenches are drawn there.
+/// Frame at the tip with the axes of the base, in which viewers draw the wrenches.
 const WRENCH_FRAME: &str = "tip_base_axes";
 
-/// What there is of a step besides the controller's input and output.
+/// Data of a step besides the controller's input and output.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Extras<const N: usize> {
-    /// Number of the step since the controller started, where steps may be lost between the
-    /// controller and the log. Default: every step is written, the writer counts.
+    /// Number of the step since the controller started, if steps may be lost between the
+    /// controller and the log. `None`: the writer counts the steps, because none is lost.
     pub step: Option<u64>,
-    /// What the force sensor measured, base axes \[N\], if the controller does not receive it.
-    /// Default: the force in the controller's input.
+    /// Measured tip force, base axes \[N\], if the controller does not receive it.
+    /// `None`: the force in the controller's input.
     pub tip_force_n: Option<Vector3<f64>>,
-    /// When the cycle began and how long it took.
+    /// Start and duration of the cycle.
     pub timing: Option<CycleTiming>,
-    /// What was really so, where the plant is simulated.
+    /// True state of a simulated plant.
     pub truth: Option<PlantTruth<N>>,
 }
 
@@ -67,10 +67,10 @@ impl Topic {
         }
     }
 
-    /// Its name, encoding and message definition, for an arm of `dof` joints.
+    /// Returns name, encoding and message definition of the channel, for an arm with `dof` joints.
     ///
     /// # Errors
-    /// A type that is not defined.
+    /// An error if a type is not defined.
     pub fn channel(self, dof: usize) -> Result<Channel, String> {
         let (topic, package, name) = self.names();
         let schema = Schema {
@@ -86,15 +86,15 @@ impl Topic {
     }
 }
 
-/// Where messages go.
-pub(crate) trait Put {
-    /// Room for the words of a record.
+/// Receiver of messages: a log or a live viewer.
+pub(crate) trait MessageSink {
+    /// Buffer for the words of a record.
     fn words(&mut self) -> &mut Vec<u64>;
 
-    /// A message of step number `step`.
+    /// Receives a message of step number `step`.
     ///
     /// # Errors
-    /// If it cannot be encoded or written.
+    /// An error if the message cannot be encoded or written.
     fn put<T: Serialize>(
         &mut self,
         channel: Topic,
@@ -104,12 +104,12 @@ pub(crate) trait Put {
     ) -> Result<(), LogError>;
 }
 
-/// Puts the messages of a step of an arm with this base link; with the transforms of its links if `with_tf` is set.
+/// Passes the messages of a step to `channels`, with the transforms of the links if `with_tf` is set; `base` is the base link.
 ///
 /// # Errors
-/// As [`Put::put`].
+/// As [`MessageSink::put`].
 pub(crate) fn emit<const N: usize>(
-    channels: &mut impl Put,
+    channels: &mut impl MessageSink,
     (description, base): (&Description, &str),
     time_ns: u64,
     record: &CycleRecord<N>,

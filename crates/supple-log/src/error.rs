@@ -78,8 +78,8 @@ pub enum LogError {
         /// Length of the file.
         bytes: u64,
     },
-    /// The result would replace the log that it is made from.
-    #[error("{file} would be replaced by what is made from it; give the result another name")]
+    /// The output would replace the log from which it is made.
+    #[error("the output would replace its own input {file}; give the output another name")]
     SameFile {
         /// File.
         file: String,

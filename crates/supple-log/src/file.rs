@@ -12,7 +12,7 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use supple_files::{check_output, open_output, with_suffix};
 
-/// Duration of one chunk: the most that a crash can lose \[ns\].
+/// Duration of one chunk, the maximum that a crash can lose \[ns\].
 const CHUNK_NS: u64 = 250_000_000;
 
 /// Name and version of the software, stored in the files.
@@ -20,7 +20,7 @@ pub(crate) const SOFTWARE: &str = concat!("supple-log ", env!("CARGO_PKG_VERSION
 
 /// Summary of a finished file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Written {
+pub struct LogSummary {
     /// File.
     pub path: PathBuf,
     /// Length of the file.
@@ -166,7 +166,7 @@ impl LogFile {
     }
 
     /// Writes the index, syncs the file to disk and renames it to its final name, replacing an existing file.
-    pub fn finish(self) -> Result<Written, LogError> {
+    pub fn finish(self) -> Result<LogSummary, LogError> {
         let LogFile {
             target,
             part,
@@ -178,7 +178,7 @@ impl LogFile {
         let named = flush(mcap.into_inner().into_inner()).and_then(|file| {
             file.sync_all()?;
             let bytes = file.metadata()?.len();
-            // Something else may have been created there while the log was written.
+            // Another file may have been created under the final name while the log was written.
             check_output(&target)?;
             std::fs::rename(&part, &target)?;
             Ok(bytes)
@@ -187,7 +187,7 @@ impl LogFile {
             file: part.display().to_string(),
             source,
         })?;
-        Ok(Written {
+        Ok(LogSummary {
             path: target,
             bytes,
             messages: statistics.message_count,

@@ -1,9 +1,9 @@
-//! What is in a log, at a glance.
+//! Overview of the content of a log.
 
 use crate::error::LogError;
-use crate::reader::{About, Reader};
+use crate::reader::{LogMetadata, Reader};
 use crate::record::{CONTROLLER_STATE, ChannelDecoder};
-use crate::scan::{Channel, Item, Scan};
+use crate::scan::{Channel, LogItem, LogScanner};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -11,35 +11,34 @@ use std::path::{Path, PathBuf};
 use supple_core::controller::Mode;
 use supple_model::with_dof;
 
-/// What is in a log.
+/// Overview of the content of a log.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Info {
     /// File.
     pub file: PathBuf,
-    /// Its length.
+    /// Length of the file.
     pub bytes: u64,
-    /// Why it is not complete; `None` where it is.
+    /// Reason for which the file is not complete; `None` if it is complete.
     pub incomplete: Option<String>,
-    /// Its metadata.
-    pub about: About,
-    /// Times of the first and the last message \[ns\]; `None` where there is none.
+    /// Metadata of the log.
+    pub about: LogMetadata,
+    /// Times of the first and the last message \[ns\]; `None` without messages.
     pub span_ns: Option<(u64, u64)>,
-    /// Chunks.
+    /// Number of chunks.
     pub chunks: u64,
     /// Channels, in the order in which they appear.
     pub channels: Vec<ChannelInfo>,
     /// Files inside.
     pub attachments: Vec<AttachmentInfo>,
-    /// Steps of the controller that the log has not: with any, it cannot be replayed.
+    /// Number of controller steps missing in the log; a log with missing steps cannot be replayed.
     pub missing_steps: u64,
-    /// Steps that the log has.
+    /// Number of steps in the log.
     pub steps: u64,
     /// Changes of mode, the first one included.
     pub modes: Vec<ModeChange>,
-    /// Faults, each where it was latched.
+    /// Faults, with the times at which they were latched.
     pub faults: Vec<FaultInfo>,
-    /// Where it was recovered from a file that was not whole: length of that file and of what was
-    /// whole in it.
+    /// For a log recovered from an incomplete file: length of that file, and of its complete part.
     pub recovered: Option<(u64, u64)>,
 }
 
@@ -50,49 +49,49 @@ pub struct ChannelInfo {
     pub topic: String,
     /// Type of its messages.
     pub schema: String,
-    /// How many.
+    /// Number of messages.
     pub messages: u64,
 }
 
-/// A file inside.
+/// A file attached to the log.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct AttachmentInfo {
     /// Name.
     pub name: String,
-    /// Its length.
+    /// Length of the file.
     pub bytes: u64,
 }
 
 /// A change of mode.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ModeChange {
-    /// When \[ns\].
+    /// Time \[ns\].
     pub time_ns: u64,
-    /// To which.
+    /// Name of the new mode.
     pub mode: String,
 }
 
 /// A fault.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct FaultInfo {
-    /// When \[ns\].
+    /// Time \[ns\].
     pub time_ns: u64,
-    /// In words.
+    /// Message of the fault.
     pub fault: String,
 }
 
-/// Reads a log from end to end. A file that is cut gives what is whole in it.
+/// Reads a whole log and returns an overview; of a truncated file, an overview of its complete part.
 ///
 /// # Errors
-/// [`LogError::Read`]; [`LogError::Format`] where it is no log of ours; [`LogError::Incomplete`] where
-/// not even its beginning is whole.
+/// [`LogError::Read`]; [`LogError::Format`] if the file is not a log of this crate; [`LogError::Incomplete`] if
+/// the file ends before its first step.
 pub fn info(path: &Path) -> Result<Info, LogError> {
-    let about = Reader::open(path)?.about().clone();
+    let about = Reader::open(path)?.metadata().clone();
     let metadata = std::fs::metadata(path).map_err(|source| LogError::Read {
         file: path.display().to_string(),
         source,
     })?;
-    let mut survey = InfoBuilder {
+    let mut builder = InfoBuilder {
         decode: with_dof!(about.joints.len(), N => summary::<N> as StepSummaryDecoder)?,
         decoder: ChannelDecoder::default(),
         last: None,
@@ -113,15 +112,15 @@ pub fn info(path: &Path) -> Result<Info, LogError> {
             recovered: None,
         },
     };
-    match survey.items(&mut Scan::open(path)?) {
+    match builder.items(&mut LogScanner::open(path)?) {
         Ok(()) => {}
-        Err(LogError::Incomplete { cause, .. }) => survey.info.incomplete = Some(cause),
+        Err(LogError::Incomplete { cause, .. }) => builder.info.incomplete = Some(cause),
         Err(error) => return Err(error),
     }
-    Ok(survey.info)
+    Ok(builder.info)
 }
 
-/// What of a step an overview needs.
+/// Fields of a step that an overview needs.
 #[derive(Clone, Copy, PartialEq)]
 struct StepSummary {
     step: u64,
@@ -129,7 +128,7 @@ struct StepSummary {
     fault: u8,
 }
 
-/// The summary, and the fault in words.
+/// Decodes a message to a summary and the message of the fault.
 type StepSummaryDecoder =
     fn(&mut ChannelDecoder, &Channel, &[u8]) -> Result<(StepSummary, String), String>;
 
@@ -151,26 +150,26 @@ struct InfoBuilder {
     decode: StepSummaryDecoder,
     decoder: ChannelDecoder,
     last: Option<StepSummary>,
-    /// Place in the list by name.
+    /// Index in the list of channels, by name.
     channels: BTreeMap<String, usize>,
     info: Info,
 }
 
 impl InfoBuilder {
-    fn items(&mut self, scan: &mut Scan) -> Result<(), LogError> {
-        while let Some(item) = scan.next()? {
+    fn items(&mut self, scanner: &mut LogScanner) -> Result<(), LogError> {
+        while let Some(item) = scanner.next()? {
             match item {
-                Item::Metadata(metadata) if metadata.name == "recovery" => {
+                LogItem::Metadata(metadata) if metadata.name == "recovery" => {
                     let number = |key| metadata.metadata.get(key)?.parse().ok();
                     self.info.recovered = number("source_bytes").zip(number("kept_bytes"));
                 }
-                Item::Metadata(_) => {}
-                Item::Attachment(header, data) => self.info.attachments.push(AttachmentInfo {
+                LogItem::Metadata(_) => {}
+                LogItem::Attachment(header, data) => self.info.attachments.push(AttachmentInfo {
                     name: header.name,
                     bytes: data.len() as u64,
                 }),
-                Item::Chunk => self.info.chunks += 1,
-                Item::Message(channel, header, data) => {
+                LogItem::Chunk => self.info.chunks += 1,
+                LogItem::Message(channel, header, data) => {
                     let time_ns = header.log_time;
                     let (first, last) = self.info.span_ns.unwrap_or((time_ns, time_ns));
                     self.info.span_ns = Some((first.min(time_ns), last.max(time_ns)));
@@ -178,7 +177,7 @@ impl InfoBuilder {
                     if channel.topic == CONTROLLER_STATE {
                         let decoded = (self.decode)(&mut self.decoder, &channel, &data);
                         let seen = decoded.map_err(|message| LogError::Format {
-                            file: scan.file().to_owned(),
+                            file: scanner.file().to_owned(),
                             message: format!("{CONTROLLER_STATE} at {time_ns} ns: {message}"),
                         })?;
                         self.step(time_ns, seen);

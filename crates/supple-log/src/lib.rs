@@ -1,15 +1,15 @@
 //! MCAP logs of a controlled arm: write, read, recover.
 //!
-//! One file holds everything that a run was: each step of the controller with its input, its answer
-//! and every term in between, to the last bit; the arm's URDF and TOML and the configuration in force;
-//! and the joint states, wrenches and transforms that viewers draw. The same `supple_core::step` is
-//! run over it again by [`replay()`].
+//! One file contains a complete run: each step of the controller with its input, its output
+//! and every torque term, bit for bit; the arm's URDF and TOML and the configuration in force;
+//! and the joint states, wrenches and transforms that viewers draw. [`replay()`] runs the same `supple_core::step`
+//! over the file again.
 //!
-//! Messages are ROS 2 CDR with `ros2msg` schemas, chunks are lz4. A log is written under
-//! `<name>.part` and takes its name when it is whole; what a crash leaves is made readable by
-//! [`recover`]. The same steps give the same bytes: nothing here reads a clock.
+//! Messages are ROS 2 CDR with `ros2msg` schemas, chunks are compressed with lz4. The writer writes a log under
+//! `<name>.part` and renames it when it is complete; after a crash, [`recover`] makes the complete part readable.
+//! The same steps give the same bytes, because this crate reads no clock.
 //!
-//! It is not for a control thread: a write may wait for the disk.
+//! Do not write from a control thread: a write may wait for the disk.
 //!
 //! | channel | type | rate |
 //! |---|---|---|
@@ -21,7 +21,7 @@
 //! | `/robot_description` | `std_msgs/msg/String` | once |
 //! | `/cycle_timing` | `supple_msgs/msg/CycleTiming` | every step that was timed |
 //! | `/plant_truth` | `supple_msgs/msg/PlantTruth` | every step of a simulated plant |
-//! | `/arm_events` | `std_msgs/msg/String` | when a button is pressed, drives change their mode |
+//! | `/arm_events` | `std_msgs/msg/String` | when a button is pressed or the drives change their mode |
 
 #![forbid(unsafe_code)]
 
@@ -50,11 +50,11 @@ mod writer;
 pub use emit::Extras;
 pub use error::LogError;
 pub use export::export_csv;
-pub use file::Written;
+pub use file::LogSummary;
 pub use info::{AttachmentInfo, ChannelInfo, FaultInfo, Info, ModeChange, info};
 pub use live::{LiveChannel, LiveEncoder, LiveMessage};
 pub use messages::{CycleTiming, PlantTruth};
-pub use reader::{About, Messages, Reader, Timed};
+pub use reader::{LogMetadata, Messages, Reader, TimedMessage};
 pub use recover::{Recovery, recover, refuse_overwriting};
 pub use replay::{Difference, Replay, replay};
 pub use writer::{RunInfo, Writer};

@@ -1,7 +1,7 @@
-//! The messages of a log for viewers that are connected now: the same channels, message definitions and bytes.
+//! The messages of a log for connected live viewers: the same channels, message definitions and bytes.
 
 use crate::cdr;
-use crate::emit::{Extras, Put, Topic, base_frame, emit};
+use crate::emit::{Extras, MessageSink, Topic, base_frame, emit};
 use crate::error::LogError;
 use serde::Serialize;
 use supple_core::controller::CycleRecord;
@@ -47,10 +47,10 @@ pub struct LiveEncoder<const N: usize> {
 }
 
 impl<const N: usize> LiveEncoder<N> {
-    /// For this arm.
+    /// Creates an encoder for this arm.
     ///
     /// # Errors
-    /// [`LogError::Model`] where the description has not `N` joints.
+    /// [`LogError::Model`] if the description does not have `N` joints.
     pub fn new(description: &Description) -> Result<Self, LogError> {
         let home = description.home::<N>()?;
         Ok(LiveEncoder {
@@ -60,10 +60,10 @@ impl<const N: usize> LiveEncoder<N> {
         })
     }
 
-    /// Every channel.
+    /// Returns all channels.
     ///
     /// # Errors
-    /// [`LogError::Format`] if a message type is not defined, a bug.
+    /// [`LogError::Format`] if a message type is not defined, which would be a bug.
     pub fn channels() -> Result<Vec<LiveChannel>, LogError> {
         let channel = |topic: &Topic| {
             let channel = topic.channel(N).map_err(unencodable)?;
@@ -76,10 +76,10 @@ impl<const N: usize> LiveEncoder<N> {
         TOPICS.iter().map(channel).collect()
     }
 
-    /// The URDF, which a viewer needs once.
+    /// Returns the message with the URDF, which a viewer needs once.
     ///
     /// # Errors
-    /// [`LogError::Format`] if it cannot be encoded.
+    /// [`LogError::Format`] if the URDF cannot be encoded.
     pub fn robot_description(&mut self) -> Result<LiveMessage, LogError> {
         let mut messages = Messages {
             words: &mut self.words,
@@ -91,10 +91,10 @@ impl<const N: usize> LiveEncoder<N> {
         first.ok_or_else(|| unencodable("no message".to_owned()))
     }
 
-    /// The messages of a step, as a log has them; always with the transforms of the links. `time_ns` is since the epoch.
+    /// Returns the messages of a step, as in a log, but always with the transforms of the links. `time_ns` counts from the epoch.
     ///
     /// # Errors
-    /// [`LogError::Format`] if one cannot be encoded.
+    /// [`LogError::Format`] if a message cannot be encoded.
     pub fn encode(
         &mut self,
         time_ns: u64,
@@ -117,7 +117,7 @@ struct Messages<'a> {
     put: Vec<LiveMessage>,
 }
 
-impl Put for Messages<'_> {
+impl MessageSink for Messages<'_> {
     fn words(&mut self) -> &mut Vec<u64> {
         self.words
     }

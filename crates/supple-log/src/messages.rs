@@ -1,4 +1,4 @@
-//! The messages that are not the controller's own, as they are written.
+//! Types of the messages besides the record of the controller.
 
 use crate::cdr::array;
 use serde::{Deserialize, Serialize};
@@ -79,18 +79,18 @@ impl<'a> TransformStamped<'a> {
     }
 }
 
-/// When a cycle began and how long it took, by a monotonic clock.
+/// Start and duration of a cycle on a monotonic clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CycleTiming {
-    /// Since the previous cycle began \[ns\].
+    /// Time since the start of the previous cycle \[ns\].
     pub period_ns: u64,
-    /// From the measurement to the beginning of the step \[ns\].
+    /// Time from the measurement to the start of the step \[ns\].
     pub latency_ns: u64,
-    /// From there until its torques are known, with a look for requests \[ns\].
+    /// Time from the start of the step until its torques are known, including the check for requests \[ns\].
     pub step_ns: u64,
 }
 
-/// What was really so in a simulated plant at the start of a cycle.
+/// True state of a simulated plant at the start of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlantTruth<const N: usize> {
     /// Joint angles \[rad\].
@@ -99,9 +99,9 @@ pub struct PlantTruth<const N: usize> {
     /// Joint velocities \[rad/s\].
     #[serde(with = "array")]
     pub velocity_rad_per_s: [f64; N],
-    /// Tip, base axes \[m\].
+    /// Position of the tip, base axes \[m\].
     pub tip_position_m: [f64; 3],
-    /// Its velocity, base axes \[m/s\].
+    /// Velocity of the tip, base axes \[m/s\].
     pub tip_velocity_m_per_s: [f64; 3],
     /// Contact force on the tip, unfiltered, base axes \[N\].
     pub contact_force_n: [f64; 3],

@@ -1,5 +1,5 @@
-//! From the bytes of a record to its content, whatever the bytes: a damaged record gives an error, not
-//! a panic and not a request for all memory.
+//! Decodes the bytes of an MCAP record. For arbitrary bytes it returns an error instead of panicking or allocating unbounded
+//! memory.
 
 use mcap::McapError;
 use mcap::records::{Record, op};
@@ -7,16 +7,16 @@ use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read};
 
-/// A longer chunk, taken apart, is damage, not data.
+/// Maximum size of a decompressed chunk; a larger one counts as damaged.
 const CHUNK_LIMIT_BYTES: usize = 1 << 28;
 
-/// A record, and the records in it if it is a chunk.
+/// Decodes a record, and the records in it if it is a chunk.
 pub(crate) fn decode_record(
     opcode: u8,
     data: &[u8],
 ) -> Result<(Record<'static>, VecDeque<Record<'static>>), McapError> {
     match opcode {
-        op::ATTACHMENT if !fits(data) => Err(McapError::UnexpectedEof),
+        op::ATTACHMENT if !has_valid_lengths(data) => Err(McapError::UnexpectedEof),
         op::CHUNK => {
             let Record::Chunk {
                 header,
@@ -26,7 +26,7 @@ pub(crate) fn decode_record(
                 return Err(McapError::BadIndex);
             };
             let whole = header.compressed_size == content.len() as u64;
-            if !whole || header.compression.is_empty() && !are_framed(&content) {
+            if !whole || header.compression.is_empty() && !lengths_fill_chunk(&content) {
                 return Err(McapError::UnexpectedEof);
             }
             let inside = chunk_records(data)?;
@@ -40,7 +40,7 @@ pub(crate) fn decode_record(
     }
 }
 
-/// Records of a chunk whose checksum is right: lengths in a damaged one would ask for any memory.
+/// Decodes the records of a chunk after verifying its checksum, because lengths in a damaged chunk could cause any allocation.
 fn chunk_records(data: &[u8]) -> Result<VecDeque<Record<'static>>, McapError> {
     let length = (data.len() as u64).to_le_bytes();
     let mut source = [op::CHUNK].as_slice().chain(length.as_slice()).chain(data);
@@ -65,9 +65,9 @@ fn chunk_records(data: &[u8]) -> Result<VecDeque<Record<'static>>, McapError> {
     Ok(records)
 }
 
-/// Whether records of an uncompressed chunk, of the lengths that they state, fill it: the reader takes one that is longer
-/// for granted.
-fn are_framed(mut records: &[u8]) -> bool {
+/// Returns whether the records of an uncompressed chunk, with the lengths that they declare, fill the chunk exactly. The MCAP
+/// reader does not check this.
+fn lengths_fill_chunk(mut records: &[u8]) -> bool {
     while !records.is_empty() {
         let prefix = records
             .get(1..)
@@ -84,9 +84,9 @@ fn are_framed(mut records: &[u8]) -> bool {
     true
 }
 
-/// Whether the name and the media type of an attachment, of the lengths that it states, leave room for
+/// Returns whether name and media type of an attachment, with the lengths that it declares, leave room for
 /// the length of its content and its checksum.
-fn fits(attachment: &[u8]) -> bool {
+fn has_valid_lengths(attachment: &[u8]) -> bool {
     const TIMES_BYTES: usize = 16;
     const LENGTH_AND_CHECKSUM_BYTES: usize = 12;
     let after_text = |rest: &'_ [u8]| -> Option<usize> {
@@ -101,7 +101,7 @@ fn fits(attachment: &[u8]) -> bool {
     rest.is_some_and(|rest| rest.len() >= LENGTH_AND_CHECKSUM_BYTES)
 }
 
-/// Bytes read, none only at the end.
+/// Reads some bytes and returns their number; zero only at the end of the source.
 pub(crate) fn read_some(source: &mut impl Read, buffer: &mut [u8]) -> std::io::Result<usize> {
     loop {
         match source.read(buffer) {

@@ -1,11 +1,11 @@
-//! Reading a log back as what was written.
+//! Reads a log: metadata, arm, configuration and messages.
 
 use crate::cdr;
 use crate::config;
 use crate::error::LogError;
 use crate::messages::{CycleTiming, OwnedHeader, PlantTruth};
-use crate::record::{CONTROLLER_STATE, ChannelDecoder, Present};
-use crate::scan::{Channel, Item, Scan};
+use crate::record::{CONTROLLER_STATE, ChannelDecoder, PresentWords};
+use crate::scan::{Channel, LogItem, LogScanner};
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
 use std::marker::PhantomData;
@@ -16,8 +16,8 @@ use supple_model::Description;
 
 /// Metadata of a log.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
-pub struct About {
-    /// Name and version of the software that wrote it.
+pub struct LogMetadata {
+    /// Name and version of the software that wrote the log.
     pub software: String,
     /// Name of the arm.
     pub arm: String,
@@ -25,26 +25,25 @@ pub struct About {
     pub joints: Vec<String>,
     /// Name of the experiment.
     pub experiment: String,
-    /// Seed of everything random in it.
+    /// Seed of all random numbers of the run.
     pub seed: Option<u64>,
-    /// When it began \[ns\]: since the epoch, or 0 in virtual time.
+    /// Start time \[ns\]: since the epoch, or 0 in virtual time.
     pub start_ns: u64,
-    /// Whatever else belongs to it, by name.
+    /// Further notes, by name.
     pub notes: BTreeMap<String, String>,
 }
 
-/// A log to read. Opening it reads its metadata and the arm; the steps are read as they
-/// are asked for.
+/// A reader of a log. Opening a log reads its metadata and the arm; the iterators read the steps one by one.
 #[derive(Clone, Debug)]
 pub struct Reader {
     path: PathBuf,
-    about: About,
+    metadata: LogMetadata,
     attachments: BTreeMap<String, Vec<u8>>,
 }
 
 /// A message and its time \[ns\].
 #[derive(Clone, Debug, PartialEq)]
-pub struct Timed<T> {
+pub struct TimedMessage<T> {
     /// Time of the measurement \[ns\].
     pub time_ns: u64,
     /// The message.
@@ -52,49 +51,52 @@ pub struct Timed<T> {
 }
 
 impl Reader {
+    /// Opens a log.
+    ///
     /// # Errors
-    /// [`LogError::Read`]; [`LogError::Format`] where it is no log of ours; [`LogError::Incomplete`]
-    /// where it stops before its first step.
+    /// [`LogError::Read`]; [`LogError::Format`] if the file is not a log of this crate; [`LogError::Incomplete`]
+    /// if it ends before its first step.
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let path = path.to_owned();
-        let mut scan = Scan::open(&path)?;
-        let mut about = None;
+        let mut scanner = LogScanner::open(&path)?;
+        let mut metadata = None;
         let mut notes = BTreeMap::new();
         let mut attachments = BTreeMap::new();
         loop {
-            match scan.next()? {
-                Some(Item::Metadata(metadata)) if metadata.name == "supple" => {
-                    about = Some(metadata.metadata);
+            match scanner.next()? {
+                Some(LogItem::Metadata(record)) if record.name == "supple" => {
+                    metadata = Some(record.metadata);
                 }
-                Some(Item::Metadata(metadata)) if metadata.name == "notes" => {
-                    notes = metadata.metadata;
+                Some(LogItem::Metadata(record)) if record.name == "notes" => {
+                    notes = record.metadata;
                 }
-                Some(Item::Metadata(_)) => {}
-                Some(Item::Attachment(header, data)) => {
+                Some(LogItem::Metadata(_)) => {}
+                Some(LogItem::Attachment(header, data)) => {
                     attachments.insert(header.name, data);
                 }
-                Some(Item::Chunk | Item::Message(..)) | None => break,
+                Some(LogItem::Chunk | LogItem::Message(..)) | None => break,
             }
         }
-        let about = about
+        let metadata = metadata
             .ok_or("no metadata named \"supple\"")
             .map_err(|message| format(&path, message))?;
-        let about = About::read(about, notes).map_err(|message| format(&path, &message))?;
+        let metadata =
+            LogMetadata::read(metadata, notes).map_err(|message| format(&path, &message))?;
         Ok(Reader {
             path,
-            about,
+            metadata,
             attachments,
         })
     }
 
-    /// The file.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Its metadata.
-    pub fn about(&self) -> &About {
-        &self.about
+    /// Metadata of the log.
+    pub fn metadata(&self) -> &LogMetadata {
+        &self.metadata
     }
 
     /// Files inside, by name: `arm.urdf`, `arm.toml`, `controller.toml`.
@@ -111,7 +113,7 @@ impl Reader {
         Ok(Description::from_text(toml, urdf)?)
     }
 
-    /// The configuration that was in force, to the last bit.
+    /// Returns the configuration that was in force, bit for bit.
     ///
     /// # Errors
     /// [`LogError::JointCount`]; [`LogError::Format`] if it is missing or invalid.
@@ -121,7 +123,7 @@ impl Reader {
         config.map_err(|message| format(&self.path, &format!("controller.toml: {message}")))
     }
 
-    /// Every step, in order. In a file that is cut, the steps that are whole and then one
+    /// Iterates over all steps in order. In a truncated file the iterator returns the complete steps and then one
     /// [`LogError::Incomplete`].
     ///
     /// # Errors
@@ -134,14 +136,14 @@ impl Reader {
         })
     }
 
-    /// The words of a record that the log's definition has, of the first channel of records; `None` without records.
-    pub(crate) fn present(&self) -> Result<Option<Present>, LogError> {
-        let mut scan = Scan::open(&self.path)?;
-        while let Some(item) = scan.next()? {
-            if let Item::Message(channel, ..) = item
+    /// Returns which words of a record the definition of the first channel of records contains; `None` without records.
+    pub(crate) fn present(&self) -> Result<Option<PresentWords>, LogError> {
+        let mut scanner = LogScanner::open(&self.path)?;
+        while let Some(item) = scanner.next()? {
+            if let LogItem::Message(channel, ..) = item
                 && channel.topic == CONTROLLER_STATE
             {
-                let present = ChannelDecoder::present(&channel, self.about.joints.len());
+                let present = ChannelDecoder::present(&channel, self.metadata.joints.len());
                 return present
                     .map(Some)
                     .map_err(|message| format(&self.path, &message));
@@ -150,7 +152,7 @@ impl Reader {
         Ok(None)
     }
 
-    /// Timing of the cycles that were timed, as [`Reader::records`].
+    /// Iterates over the timing of all cycles that were timed, as [`Reader::records`].
     ///
     /// # Errors
     /// [`LogError::Read`].
@@ -161,11 +163,11 @@ impl Reader {
         })
     }
 
-    /// What was really so in a simulated plant, as [`Reader::records`].
+    /// Iterates over the true states of a simulated plant, as [`Reader::records`].
     ///
     /// # Errors
     /// [`LogError::JointCount`]; [`LogError::Read`].
-    pub fn truths<const N: usize>(&self) -> Result<Messages<PlantTruth<N>>, LogError> {
+    pub fn plant_truths<const N: usize>(&self) -> Result<Messages<PlantTruth<N>>, LogError> {
         self.messages::<N, _>("/plant_truth", without_header)
     }
 
@@ -179,7 +181,7 @@ impl Reader {
     }
 
     fn expect_joints(&self, expected: usize) -> Result<(), LogError> {
-        let found = self.about.joints.len();
+        let found = self.metadata.joints.len();
         if expected == found {
             return Ok(());
         }
@@ -198,11 +200,11 @@ impl Reader {
     }
 }
 
-impl About {
+impl LogMetadata {
     fn read(
         mut map: BTreeMap<String, String>,
         notes: BTreeMap<String, String>,
-    ) -> Result<About, String> {
+    ) -> Result<LogMetadata, String> {
         let seed = map.remove("seed");
         let mut entry = |key: &str| {
             map.remove(key)
@@ -212,7 +214,7 @@ impl About {
             let number = text.parse::<u64>();
             number.map_err(|_| format!("metadata \"supple\": {text:?} is not a whole number"))
         };
-        Ok(About {
+        Ok(LogMetadata {
             software: entry("software")?,
             arm: entry("arm")?,
             joints: entry("joints")?.split(' ').map(str::to_owned).collect(),
@@ -224,12 +226,12 @@ impl About {
     }
 }
 
-/// From the bytes of a message of a channel to its value.
+/// Decodes the bytes of a message of a channel to a value.
 type Decode<T> = Box<dyn FnMut(&Channel, &[u8]) -> Result<T, String>>;
 
 /// Messages of one channel, in order.
 pub struct Messages<T> {
-    scan: Scan,
+    scanner: LogScanner,
     topic: &'static str,
     decode: Decode<T>,
     ended: bool,
@@ -243,7 +245,7 @@ impl<T> Messages<T> {
         decode: impl FnMut(&Channel, &[u8]) -> Result<T, String> + 'static,
     ) -> Result<Self, LogError> {
         Ok(Messages {
-            scan: Scan::open(path)?,
+            scanner: LogScanner::open(path)?,
             topic,
             decode: Box::new(decode),
             ended: false,
@@ -251,27 +253,27 @@ impl<T> Messages<T> {
         })
     }
 
-    fn advance(&mut self) -> Result<Option<Timed<T>>, LogError> {
-        while let Some(item) = self.scan.next()? {
-            let Item::Message(channel, header, data) = item else {
+    fn advance(&mut self) -> Result<Option<TimedMessage<T>>, LogError> {
+        while let Some(item) = self.scanner.next()? {
+            let LogItem::Message(channel, header, data) = item else {
                 continue;
             };
             if channel.topic != self.topic {
                 continue;
             }
             let value = (self.decode)(&channel, &data).map_err(|message| LogError::Format {
-                file: self.scan.file().to_owned(),
+                file: self.scanner.file().to_owned(),
                 message: format!("{} at {} ns: {message}", self.topic, header.log_time),
             })?;
             let time_ns = header.log_time;
-            return Ok(Some(Timed { time_ns, value }));
+            return Ok(Some(TimedMessage { time_ns, value }));
         }
         Ok(None)
     }
 }
 
 impl<T> Iterator for Messages<T> {
-    type Item = Result<Timed<T>, LogError>;
+    type Item = Result<TimedMessage<T>, LogError>;
 
     fn next(&mut self) -> Option<Self::Item> {
         if self.ended {

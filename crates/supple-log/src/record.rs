@@ -1,6 +1,6 @@
-//! The record of a cycle as a message: its definition, its bytes, and the record from the bytes of this or an earlier
-//! version. Fields are found by their names in the definition inside the log; what an earlier version lacks gets its
-//! default, what a later one has beside is left out.
+//! The record of a cycle as a message: message definition, encoding, and decoding of messages of this or another
+//! version. The decoder finds fields by their names in the definition inside the log. A field that the log lacks gets its
+//! default; a field that only the log has is skipped.
 
 use crate::definition::{self, Count, Definitions, Field as Defined, Kind};
 use crate::scan::{Channel, Schema};
@@ -21,11 +21,11 @@ pub(crate) const CONTROLLER_STATE: &str = "/controller_state";
 const TERMS_TYPE: &str = "supple_msgs/TorqueTerms";
 /// Type of a vector.
 const VECTOR_TYPE: &str = "geometry_msgs/Vector3";
-/// Fields that earlier versions lack, whose value then is not zero.
+/// Fields that earlier versions lack and whose default is not zero.
 const DEFAULTS: &[(&str, u64)] = &[("drives_active", 1)];
 /// Names of fields in earlier versions, and their names now.
 const RENAMED: &[(&str, &str)] = &[("least_singular_value_m", "min_singular_value_m")];
-/// Before the fields of a record.
+/// Text before the fields of a record.
 const HEAD: &str = "\
 # One step of the controller: input, output, and every term of the torque.
 #
@@ -91,7 +91,7 @@ fn constants(field: &str) -> Vec<(String, u8)> {
     }
 }
 
-/// A description from the source's documentation: without the escapes of its mark-up.
+/// Writes a description from a doc comment as a comment, without the escapes of its mark-up.
 fn comment(text: &mut String, description: &str) {
     for line in description.lines() {
         let line = line
@@ -122,7 +122,7 @@ fn kind_of(element: Element) -> Kind {
     }
 }
 
-/// The words of a record, as they are serialized.
+/// The words of a record, for serialisation.
 pub(crate) struct RecordWords<'a> {
     pub words: &'a [u64],
     pub joints: usize,
@@ -174,21 +174,21 @@ fn one<T: SerializeTuple>(tuple: &mut T, element: Element, word: u64) -> Result<
     }
 }
 
-/// Reads records of one definition.
+/// Decodes records of one message definition.
 struct RecordDecoder {
     definitions: Definitions,
     joints: usize,
-    steps: Vec<Step>,
+    steps: Vec<DecodeOperation>,
     defaults: Vec<u64>,
 }
 
-/// The words of a record that its definition has.
+/// Flags for the words of a record that a message definition contains.
 #[derive(Clone, Debug)]
-pub(crate) struct Present(Vec<bool>);
+pub(crate) struct PresentWords(Vec<bool>);
 
-impl Present {
-    /// Sets the words of `again` that a log does not have to those of `logged`.
-    pub fn keep(&self, logged: &[u64], again: &mut [u64]) {
+impl PresentWords {
+    /// Copies the words that the log does not contain from `logged` to `again`.
+    pub fn restore_absent(&self, logged: &[u64], again: &mut [u64]) {
         let words = again.iter_mut().zip(logged).zip(&self.0);
         for ((again, logged), _) in words.filter(|(_, present)| !**present) {
             *again = *logged;
@@ -196,22 +196,22 @@ impl Present {
     }
 }
 
-enum Step {
-    /// Values of this type, to the words from here on.
+enum DecodeOperation {
+    /// Reads values of this type to the given number of words from the given index on.
     Words(Kind, usize, usize),
-    /// A list of numbers.
+    /// Reads a list of numbers to the words from this index on, with its maximum length.
     List(usize, usize),
-    /// A text.
+    /// Reads a text to the words from this index on.
     Text(usize),
-    /// Nothing of this field is wanted.
+    /// Skips a field.
     Skip(Defined),
 }
 
 impl RecordDecoder {
-    /// For the definition inside a log of an arm of `joints` joints.
+    /// Creates a decoder for the definition inside a log of an arm with `joints` joints.
     ///
     /// # Errors
-    /// A field whose type is another one.
+    /// An error if a field has another type than in this version.
     pub fn new(definitions: Definitions, joints: usize) -> Result<RecordDecoder, String> {
         let mut defaults = vec![0; CycleRecord::<1>::words(joints)];
         for (name, word) in DEFAULTS {
@@ -226,7 +226,7 @@ impl RecordDecoder {
                 return Err(format!("field {} is defined twice", defined.name));
             }
             match find(&defined.name, joints) {
-                None => steps.push(Step::Skip(defined.clone())),
+                None => steps.push(DecodeOperation::Skip(defined.clone())),
                 Some((Shape::Terms(terms), at)) => {
                     expect(defined, &Kind::Message(TERMS_TYPE.to_owned()), Count::One)?;
                     for inner in definitions.fields(TERMS_TYPE) {
@@ -244,46 +244,46 @@ impl RecordDecoder {
         })
     }
 
-    /// The words that the definition has.
-    fn present(&self) -> Present {
+    /// Returns which words the definition contains.
+    fn present(&self) -> PresentWords {
         let mut present = vec![false; self.defaults.len()];
         for step in &self.steps {
             let (at, count) = match step {
-                Step::Words(_, at, count) => (*at, *count),
-                Step::List(at, max) => (*at, 1 + max),
-                Step::Text(at) => (*at, Shape::Text.words(0)),
-                Step::Skip(_) => continue,
+                DecodeOperation::Words(_, at, count) => (*at, *count),
+                DecodeOperation::List(at, max) => (*at, 1 + max),
+                DecodeOperation::Text(at) => (*at, Shape::Text.words(0)),
+                DecodeOperation::Skip(_) => continue,
             };
             present[at..at + count].fill(true);
         }
-        Present(present)
+        PresentWords(present)
     }
 
-    /// The record in the bytes of a message.
+    /// Decodes a message.
     ///
     /// # Errors
-    /// Bytes that are not of the definition.
+    /// An error if the bytes do not match the definition.
     pub fn decode<const N: usize>(&self, data: &[u8]) -> Result<CycleRecord<N>, String> {
         let mut values = Values::new(data)?;
         let mut words = self.defaults.clone();
         for step in &self.steps {
             match step {
-                Step::Words(kind, at, count) => {
+                DecodeOperation::Words(kind, at, count) => {
                     for word in &mut words[*at..at + count] {
                         *word = values.word(kind)?;
                     }
                 }
-                Step::List(at, max) => {
+                DecodeOperation::List(at, max) => {
                     let count = values.length()? as usize;
                     if count > *max {
-                        return Err(format!("a list of {count} values, at most {max} are read"));
+                        return Err(format!("a list has {count} values, the maximum is {max}"));
                     }
                     words[*at] = count as u64;
                     for word in &mut words[at + 1..=at + count] {
                         *word = values.word(&Kind::Float64)?;
                     }
                 }
-                Step::Text(at) => {
+                DecodeOperation::Text(at) => {
                     let text = values.string()?;
                     let places = &mut words[*at..at + Shape::Text.words(0)];
                     let mut end = text.len().min(8 * (places.len() - 1));
@@ -298,7 +298,7 @@ impl RecordDecoder {
                         *word = u64::from_le_bytes(bytes);
                     }
                 }
-                Step::Skip(field) => values.skip(&self.definitions, field)?,
+                DecodeOperation::Skip(field) => values.skip(&self.definitions, field)?,
             }
         }
         values.end()?;
@@ -306,25 +306,25 @@ impl RecordDecoder {
     }
 }
 
-/// Reads the records of one channel, whatever its definition.
+/// Decodes the records of one channel with the channel's own definition.
 #[derive(Default)]
 pub(crate) struct ChannelDecoder(Option<(Arc<Schema>, RecordDecoder)>);
 
 impl ChannelDecoder {
-    /// The words that the definition of a channel has.
+    /// Returns which words the definition of a channel contains.
     ///
     /// # Errors
     /// As [`ChannelDecoder::decode`].
-    pub fn present(channel: &Channel, joints: usize) -> Result<Present, String> {
+    pub fn present(channel: &Channel, joints: usize) -> Result<PresentWords, String> {
         let text = String::from_utf8_lossy(&channel.schema.text);
         let definitions = definition::parse(&channel.schema.name, &text)?;
         Ok(RecordDecoder::new(definitions, joints)?.present())
     }
 
-    /// The record in a message of the channel.
+    /// Decodes a message of the channel.
     ///
     /// # Errors
-    /// A definition that is none of a record; bytes that are not of it.
+    /// An error if the definition is not that of a record, or if the bytes do not match it.
     pub fn decode<const N: usize>(
         &mut self,
         channel: &Channel,
@@ -341,12 +341,12 @@ impl ChannelDecoder {
         }
         match &self.0 {
             Some((_, decoder)) => decoder.decode(data),
-            None => Err("no definition".to_owned()),
+            None => Err("the channel has no message definition".to_owned()),
         }
     }
 }
 
-/// Refuses a definition that is none of a record, which would be read as one of zeros.
+/// Rejects a definition that is not that of a record, because its records would decode to zeros.
 fn check(definitions: &Definitions) -> Result<(), String> {
     for needed in [
         "step",
@@ -373,7 +373,7 @@ fn check(definitions: &Definitions) -> Result<(), String> {
     }
 }
 
-/// The field of this name or of this earlier name, and its first word.
+/// Finds a field by its present or earlier name; returns its shape and the index of its first word.
 fn find(name: &str, joints: usize) -> Option<(Shape, usize)> {
     let renamed = RENAMED.iter().find(|(earlier, _)| *earlier == name);
     let name = renamed.map_or(name, |(_, now)| now);
@@ -387,37 +387,51 @@ fn find(name: &str, joints: usize) -> Option<(Shape, usize)> {
     None
 }
 
-fn step(defined: &Defined, shape: Shape, at: usize, joints: usize) -> Result<Step, String> {
+fn step(
+    defined: &Defined,
+    shape: Shape,
+    at: usize,
+    joints: usize,
+) -> Result<DecodeOperation, String> {
     Ok(match shape {
         Shape::One(element) => {
             expect(defined, &kind_of(element), Count::One)?;
-            Step::Words(kind_of(element), at, 1)
+            DecodeOperation::Words(kind_of(element), at, 1)
         }
         Shape::PerJoint(element) => {
             expect(defined, &kind_of(element), Count::Array(joints))?;
-            Step::Words(kind_of(element), at, joints)
+            DecodeOperation::Words(kind_of(element), at, joints)
         }
         Shape::Vector | Shape::Terms(_) => {
             expect(defined, &Kind::Message(VECTOR_TYPE.to_owned()), Count::One)?;
-            Step::Words(Kind::Float64, at, 3)
+            DecodeOperation::Words(Kind::Float64, at, 3)
         }
         Shape::List(max) => {
             expect(defined, &Kind::Float64, Count::Bounded)?;
-            Step::List(at, max)
+            DecodeOperation::List(at, max)
         }
         Shape::Text => {
             expect(defined, &Kind::String, Count::One)?;
-            Step::Text(at)
+            DecodeOperation::Text(at)
         }
     })
 }
 
-fn term(defined: &Defined, terms: &[Term], at: usize, joints: usize) -> Result<Step, String> {
+fn term(
+    defined: &Defined,
+    terms: &[Term],
+    at: usize,
+    joints: usize,
+) -> Result<DecodeOperation, String> {
     match terms.iter().position(|term| term.name == defined.name) {
-        None => Ok(Step::Skip(defined.clone())),
+        None => Ok(DecodeOperation::Skip(defined.clone())),
         Some(row) => {
             expect(defined, &Kind::Float64, Count::Array(joints))?;
-            Ok(Step::Words(Kind::Float64, at + row * joints, joints))
+            Ok(DecodeOperation::Words(
+                Kind::Float64,
+                at + row * joints,
+                joints,
+            ))
         }
     }
 }

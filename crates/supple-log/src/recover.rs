@@ -2,7 +2,7 @@
 
 use crate::error::LogError;
 use crate::file::LogFile;
-use crate::scan::{Channel, Item, Scan};
+use crate::scan::{Channel, LogItem, LogScanner};
 use mcap::records::MessageHeader;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -62,7 +62,7 @@ impl fmt::Display for Recovery {
 /// [`LogError::NoCompleteChunk`], [`LogError::SameFile`]; [`LogError::Format`] if `from` is not an MCAP file;
 /// errors of reading and writing.
 pub fn recover(from: &Path, to: &Path) -> Result<Recovery, LogError> {
-    let mut scan = Scan::open(from)?;
+    let mut scanner = LogScanner::open(from)?;
     let read_error = |source| LogError::Read {
         file: from.display().to_string(),
         source,
@@ -75,7 +75,7 @@ pub fn recover(from: &Path, to: &Path) -> Result<Recovery, LogError> {
         messages: 0,
         span_ns: None,
     };
-    let stopped = match writer.copy_all(&mut scan, source_bytes) {
+    let stopped = match writer.copy_all(&mut scanner, source_bytes) {
         Ok(stopped) => stopped,
         Err(error) => {
             writer.file.discard();
@@ -91,7 +91,7 @@ pub fn recover(from: &Path, to: &Path) -> Result<Recovery, LogError> {
         kept_bytes: if stopped.is_none() {
             source_bytes
         } else {
-            scan.complete_bytes()
+            scanner.complete_bytes()
         },
         messages: writer.messages,
         chunks: written.chunks,
@@ -130,40 +130,47 @@ struct RecoveryWriter {
 
 impl RecoveryWriter {
     /// Copies all complete chunks. Returns the reason if copying stopped before the end of the file.
-    fn copy_all(&mut self, scan: &mut Scan, source_bytes: u64) -> Result<Option<String>, LogError> {
-        let stopped = match self.copy_items(scan) {
+    fn copy_all(
+        &mut self,
+        scanner: &mut LogScanner,
+        source_bytes: u64,
+    ) -> Result<Option<String>, LogError> {
+        let stopped = match self.copy_items(scanner) {
             Ok(()) => None,
             Err(LogError::Incomplete { cause, .. }) => Some(cause),
             Err(error) => return Err(error),
         };
         if self.messages == 0 {
             return Err(LogError::NoCompleteChunk {
-                file: scan.file().to_owned(),
+                file: scanner.file().to_owned(),
                 bytes: source_bytes,
             });
         }
         if stopped.is_some() {
             let kept = BTreeMap::from([
                 ("source_bytes".to_owned(), source_bytes.to_string()),
-                ("kept_bytes".to_owned(), scan.complete_bytes().to_string()),
+                (
+                    "kept_bytes".to_owned(),
+                    scanner.complete_bytes().to_string(),
+                ),
             ]);
             self.file.metadata("recovery", kept)?;
         }
         Ok(stopped)
     }
 
-    fn copy_items(&mut self, scan: &mut Scan) -> Result<(), LogError> {
-        while let Some(item) = scan.next()? {
+    fn copy_items(&mut self, scanner: &mut LogScanner) -> Result<(), LogError> {
+        while let Some(item) = scanner.next()? {
             match item {
-                Item::Metadata(metadata) => {
+                LogItem::Metadata(metadata) => {
                     self.file.metadata(&metadata.name, metadata.metadata)?;
                 }
-                Item::Attachment(header, data) => {
+                LogItem::Attachment(header, data) => {
                     self.file
                         .attach(&header.name, &header.media_type, header.log_time, &data)?
                 }
-                Item::Chunk => self.file.close_chunk()?,
-                Item::Message(channel, header, data) => {
+                LogItem::Chunk => self.file.close_chunk()?,
+                LogItem::Message(channel, header, data) => {
                     self.copy_message(&channel, header, &data)?
                 }
             }

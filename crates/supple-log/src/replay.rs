@@ -1,8 +1,8 @@
-//! Running the controller over a log again: the same step, the same bits.
+//! Replay: runs the controller over a log again, and compares its outputs bit for bit.
 //!
-//! The configuration, the inputs and the answers come from the log itself. Every logged answer, with
-//! every term in it, is compared to the last bit; timing and what a plant knew are not the controller's
-//! and are left out.
+//! Configuration, inputs and outputs come from the log itself. Every logged output, with
+//! every torque term, is compared bit for bit; timing and the true state of the plant are not outputs of the controller
+//! and are not compared.
 
 use crate::cdr;
 use crate::error::LogError;
@@ -20,43 +20,43 @@ use supple_model::with_dof;
 /// Type of a step's message.
 const RECORD: &str = "supple_msgs/ControllerState";
 
-/// What a replay gave.
+/// Result of a replay.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Replay {
     /// Log.
     pub file: PathBuf,
-    /// Steps that were run again.
+    /// Number of replayed steps.
     pub steps: u64,
-    /// Steps whose answer is not the logged one, bit for bit.
+    /// Number of steps whose output differs from the logged one in any bit.
     pub different_steps: u64,
-    /// Where the first of them differs.
+    /// First difference.
     pub first_difference: Option<Difference>,
 }
 
-/// Where an answer is not the logged one.
+/// A difference between a logged and a replayed output.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Difference {
     /// Step of the controller.
     pub step: u64,
-    /// Its time \[ns\].
+    /// Time of the step \[ns\].
     pub time_ns: u64,
     /// First field that differs, as `supple log export` names it.
     pub field: String,
-    /// Its value in the log.
+    /// Value in the log.
     pub logged: String,
-    /// Its value now.
+    /// Value in the replay.
     pub replayed: String,
 }
 
 /// Runs the controller over a log again.
 ///
 /// # Errors
-/// [`LogError::Gap`] where steps are missing: the state after them is not known.
-/// [`LogError::Incomplete`] where the file is cut. [`LogError::Format`] where it holds a configuration
+/// [`LogError::Gap`] if steps are missing, because the state after them is unknown;
+/// [`LogError::Incomplete`] if the file is truncated; [`LogError::Format`] if it contains a configuration
 /// or a request that this version does not have.
 pub fn replay(path: &Path) -> Result<Replay, LogError> {
     let reader = Reader::open(path)?;
-    with_dof!(reader.about().joints.len(), N => run::<N>(&reader))?
+    with_dof!(reader.metadata().joints.len(), N => run::<N>(&reader))?
 }
 
 fn run<const N: usize>(reader: &Reader) -> Result<Replay, LogError> {
@@ -90,7 +90,7 @@ fn run<const N: usize>(reader: &Reader) -> Result<Replay, LogError> {
             .map_err(|message| broken(format!("step {}: {message}", logged.step)))?;
         let output = step(&controller, &mut state, &input);
         let mut again = CycleRecord::new(logged.step, &input, &output);
-        // Words may change between versions; the numbers that they are made of are compared.
+        // Messages may change between versions, so only the numbers in them are compared.
         if again.fault == logged.fault {
             again.fault_text = logged.fault_text;
         }
@@ -99,7 +99,7 @@ fn run<const N: usize>(reader: &Reader) -> Result<Replay, LogError> {
         }
         let (logged_words, mut again_words) = (packed(&logged), packed(&again));
         if let Some(present) = &present {
-            present.keep(&logged_words, &mut again_words);
+            present.restore_absent(&logged_words, &mut again_words);
         }
         replay.steps += 1;
         let encoded = |words: &[u64]| encoded(time_ns, words, N);
@@ -108,7 +108,7 @@ fn run<const N: usize>(reader: &Reader) -> Result<Replay, LogError> {
         if logged != again {
             replay.different_steps += 1;
             if replay.first_difference.is_none() {
-                let found = difference::<N>(&reader.about().joints, &logged, &again);
+                let found = difference::<N>(&reader.metadata().joints, &logged, &again);
                 let [field, logged, replayed] = found.map_err(broken)?;
                 replay.first_difference = Some(Difference {
                     step: replay.steps - 1,
@@ -129,7 +129,7 @@ fn packed<const N: usize>(record: &CycleRecord<N>) -> Vec<u64> {
     words
 }
 
-/// A record as a message, in which equal means equal to the last bit.
+/// Encodes a record as a message; two messages are equal if and only if the records are equal bit for bit.
 fn encoded(time_ns: u64, words: &[u64], joints: usize) -> Result<Vec<u8>, String> {
     let header = Header {
         stamp: Stamp::from_ns(time_ns),

@@ -35,8 +35,8 @@ pub(crate) struct Schema {
     pub text: Vec<u8>,
 }
 
-/// Item of a file.
-pub(crate) enum Item {
+/// Item of a log file.
+pub(crate) enum LogItem {
     Metadata(Metadata),
     Attachment(AttachmentHeader, Vec<u8>),
     /// Start of a complete chunk.
@@ -44,7 +44,7 @@ pub(crate) enum Item {
     Message(Arc<Channel>, MessageHeader, Vec<u8>),
 }
 
-pub(crate) struct Scan {
+pub(crate) struct LogScanner {
     file: String,
     source: BufReader<File>,
     reader: LinearReader,
@@ -57,7 +57,7 @@ pub(crate) struct Scan {
     ended: bool,
 }
 
-impl Scan {
+impl LogScanner {
     pub fn open(path: &Path) -> Result<Self, LogError> {
         let file = path.display().to_string();
         let (source, bytes) = match supple_files::open_input(path) {
@@ -70,7 +70,7 @@ impl Scan {
         let options = LinearReaderOptions::default()
             .with_emit_chunks(true)
             .with_record_length_limit(usize::try_from(bytes.min(RECORD_LIMIT_BYTES)).unwrap_or(0));
-        Ok(Scan {
+        Ok(LogScanner {
             file,
             source,
             reader: LinearReader::new_with_options(options),
@@ -98,10 +98,10 @@ impl Scan {
     /// # Errors
     /// [`LogError::Incomplete`] if the file is truncated or damaged, then `None`; [`LogError::Format`] if it is not an
     /// MCAP file; [`LogError::Read`].
-    pub fn next(&mut self) -> Result<Option<Item>, LogError> {
+    pub fn next(&mut self) -> Result<Option<LogItem>, LogError> {
         loop {
             while let Some(record) = self.chunk.pop_front() {
-                if let Some(item) = self.of_chunk(record)? {
+                if let Some(item) = self.chunk_item(record)? {
                     return Ok(Some(item));
                 }
             }
@@ -115,13 +115,13 @@ impl Scan {
             match record {
                 _ if self.past_data => {}
                 Record::DataEnd(_) => self.past_data = true,
-                Record::Metadata(metadata) => return Ok(Some(Item::Metadata(metadata))),
+                Record::Metadata(metadata) => return Ok(Some(LogItem::Metadata(metadata))),
                 Record::Attachment { header, data, .. } => {
-                    return Ok(Some(Item::Attachment(header, data.into_owned())));
+                    return Ok(Some(LogItem::Attachment(header, data.into_owned())));
                 }
-                Record::Chunk { .. } => return Ok(Some(Item::Chunk)),
+                Record::Chunk { .. } => return Ok(Some(LogItem::Chunk)),
                 record => {
-                    if let Some(item) = self.of_chunk(record)? {
+                    if let Some(item) = self.chunk_item(record)? {
                         return Ok(Some(item));
                     }
                 }
@@ -129,7 +129,7 @@ impl Scan {
         }
     }
 
-    /// The next record at the top level of the file. Chunks are decoded on the way.
+    /// Returns the next record at the top level of the file; decodes the records of a chunk.
     fn record(&mut self) -> Result<Option<Record<'static>>, LogError> {
         loop {
             match self.reader.next_event() {
@@ -159,7 +159,7 @@ impl Scan {
                 Some(Err(McapError::BadMagic)) if !self.past_data => {
                     return Err(LogError::Format {
                         file: self.file.clone(),
-                        message: "it does not start like an MCAP file".into(),
+                        message: "the file does not start like an MCAP file".into(),
                     });
                 }
                 Some(Err(error)) => return Err(self.incomplete(&error.to_string())),
@@ -167,7 +167,7 @@ impl Scan {
         }
     }
 
-    fn of_chunk(&mut self, record: Record<'static>) -> Result<Option<Item>, LogError> {
+    fn chunk_item(&mut self, record: Record<'static>) -> Result<Option<LogItem>, LogError> {
         match record {
             Record::Schema { header, data } => {
                 let schema = Schema {
@@ -191,7 +191,7 @@ impl Scan {
                 let channel = channel.ok_or_else(|| {
                     self.incomplete(&format!("channel {} is not defined", header.channel_id))
                 })?;
-                return Ok(Some(Item::Message(channel, header, data.into_owned())));
+                return Ok(Some(LogItem::Message(channel, header, data.into_owned())));
             }
             _ => {}
         }

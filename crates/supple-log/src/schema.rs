@@ -1,10 +1,10 @@
-//! Message definitions in `ros2msg`: the text of a type followed by that of every type it uses.
+//! Message definitions in `ros2msg`: the text of a type, followed by the text of every type that it uses.
 
 use crate::definition::{self, Kind};
 use crate::record;
 use std::borrow::Cow;
 
-/// Name and fields of every type that does not follow from the record; `[N]` stands for the number of joints.
+/// Name and fields of every type that is not derived from the record; `[N]` stands for the number of joints.
 const TYPES: [(&str, &str); 13] = [
     ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"),
     (
@@ -52,10 +52,10 @@ const TYPES: [(&str, &str); 13] = [
     ),
 ];
 
-/// Text of `name` (`package/Type`), one of the types above, for an arm of `dof` joints.
+/// Returns the text of the type `name` (`package/Type`) for an arm with `dof` joints.
 ///
 /// # Errors
-/// A type, or one that it uses, that is not defined here.
+/// An error if the type, or a type that it uses, is not defined here.
 pub(crate) fn text(name: &str, dof: usize) -> Result<String, String> {
     let mut text = String::new();
     let mut names = vec![name.to_owned()];

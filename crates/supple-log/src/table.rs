@@ -1,19 +1,19 @@
 //! Converts messages to table rows according to their definition.
 //!
-//! The layout is determined once, from the first message: its steps then read any other message of the same
+//! The layout is determined once, from the first message; its read operations then read every other message of the same
 //! shape sequentially.
 
 use crate::definition::{Count, Definitions, Field, Kind, MAX_FIELDS};
 use crate::values::Values;
 
-/// Steps that read a message, and names of the columns that they fill.
+/// Read operations of a message, and names of the columns that they fill.
 pub(crate) struct Table {
-    steps: Vec<Step>,
+    operations: Vec<ReadOperation>,
     columns: Vec<String>,
     row: String,
 }
 
-enum Step {
+enum ReadOperation {
     /// A value with a column of its own.
     Cell(Kind),
     /// A value that is skipped.
@@ -25,17 +25,18 @@ enum Step {
 }
 
 impl Table {
-    /// `first` is the first message; arrays and sequences with one entry per joint get the joint names.
+    /// Determines the layout from the message `first`; columns of arrays and sequences with one element per joint get the joint
+    /// names.
     pub fn new(
         definitions: &Definitions,
         first: &[u8],
         joints: &[String],
     ) -> Result<Table, String> {
-        let mut layout = Layout {
+        let mut layout = LayoutBuilder {
             definitions,
             joints,
             values: Values::new(first)?,
-            steps: Vec::new(),
+            operations: Vec::new(),
             columns: vec!["log_time_ns".to_owned()],
             fields: 0,
         };
@@ -45,38 +46,38 @@ impl Table {
         }
         layout.values.end()?;
         Ok(Table {
-            steps: layout.steps,
+            operations: layout.operations,
             columns: layout.columns,
             row: String::new(),
         })
     }
 
-    /// Names of the columns, as a line.
-    pub fn heading(&self) -> String {
-        let mut heading = String::new();
+    /// Returns the names of the columns as a line.
+    pub fn header_row(&self) -> String {
+        let mut header_row = String::new();
         for column in &self.columns {
-            push_cell(&mut heading, column);
+            push_cell(&mut header_row, column);
         }
-        end_line(&mut heading);
-        heading
+        end_line(&mut header_row);
+        header_row
     }
 
-    /// One message, as a line.
+    /// Returns one message as a line.
     pub fn row(&mut self, time_ns: u64, data: &[u8]) -> Result<&str, String> {
         let mut row = std::mem::take(&mut self.row);
         row.clear();
         push_cell(&mut row, &time_ns.to_string());
-        let read = self.visit(data, |cell| push_cell(&mut row, cell));
+        let read = self.for_each_cell(data, |cell| push_cell(&mut row, cell));
         end_line(&mut row);
         self.row = row;
         read.map(|()| self.row.as_str())
     }
 
-    /// First column in which two messages differ, with both values.
+    /// Returns the first column in which two messages differ, with both values.
     pub fn difference(&self, a: &[u8], b: &[u8]) -> Result<Option<[String; 3]>, String> {
         let mut cells = [Vec::new(), Vec::new()];
         for (data, cells) in [a, b].iter().zip(&mut cells) {
-            self.visit(data, |cell| cells.push(cell.to_owned()))?;
+            self.for_each_cell(data, |cell| cells.push(cell.to_owned()))?;
         }
         let [a, b] = cells;
         // The first column is the time, which is not a cell of the message.
@@ -85,29 +86,29 @@ impl Table {
         Ok(differs.map(|(column, (a, b))| [column.clone(), a, b]))
     }
 
-    /// Shows the cells of a message in the order of the columns.
-    fn visit(&self, data: &[u8], mut show: impl FnMut(&str)) -> Result<(), String> {
+    /// Calls `on_cell` with each cell of a message, in the order of the columns.
+    fn for_each_cell(&self, data: &[u8], mut on_cell: impl FnMut(&str)) -> Result<(), String> {
         let mut values = Values::new(data)?;
-        for step in &self.steps {
+        for step in &self.operations {
             match step {
-                Step::Cell(kind) => show(values.next(kind)?),
-                Step::Skip(kind) => {
+                ReadOperation::Cell(kind) => on_cell(values.next(kind)?),
+                ReadOperation::Skip(kind) => {
                     values.next(kind)?;
                 }
-                Step::Length(expected) => {
+                ReadOperation::Length(expected) => {
                     let found = values.length()?;
                     if found != *expected {
                         return Err(format!(
-                            "a sequence of {found}, in the first message it had {expected}"
+                            "a sequence has {found} elements; in the first message it had {expected}"
                         ));
                     }
                 }
-                Step::List(kind) => {
+                ReadOperation::List(kind) => {
                     let mut list = Vec::new();
                     for _ in 0..values.length()? {
                         list.push(values.next(kind)?.to_owned());
                     }
-                    show(&list.join(" "));
+                    on_cell(&list.join(" "));
                 }
             }
         }
@@ -115,17 +116,17 @@ impl Table {
     }
 }
 
-struct Layout<'a> {
+struct LayoutBuilder<'a> {
     definitions: &'a Definitions,
     joints: &'a [String],
     values: Values<'a>,
-    steps: Vec<Step>,
+    operations: Vec<ReadOperation>,
     columns: Vec<String>,
     /// Fields and elements visited so far.
     fields: usize,
 }
 
-impl Layout<'_> {
+impl LayoutBuilder<'_> {
     fn count(&mut self, name: &str) -> Result<(), String> {
         self.fields += 1;
         match self.fields > MAX_FIELDS {
@@ -144,14 +145,15 @@ impl Layout<'_> {
             Count::Array(count) => self.elements(&field.kind, name, count, skip),
             Count::Sequence => {
                 let count = self.values.length()?;
-                self.steps.push(Step::Length(count));
+                self.operations.push(ReadOperation::Length(count));
                 self.elements(&field.kind, name, count as usize, skip)
             }
             Count::Bounded => {
                 for _ in 0..self.values.length()? {
                     self.values.next(&field.kind)?;
                 }
-                self.steps.push(Step::List(field.kind.clone()));
+                self.operations
+                    .push(ReadOperation::List(field.kind.clone()));
                 self.columns.push(name.to_owned());
                 Ok(())
             }
@@ -185,9 +187,9 @@ impl Layout<'_> {
         }
         self.values.next(kind)?;
         if skip {
-            self.steps.push(Step::Skip(kind.clone()));
+            self.operations.push(ReadOperation::Skip(kind.clone()));
         } else {
-            self.steps.push(Step::Cell(kind.clone()));
+            self.operations.push(ReadOperation::Cell(kind.clone()));
             self.columns.push(name.to_owned());
         }
         Ok(())

@@ -61,7 +61,7 @@ enum LoadTorqueDef {
     Motor,
 }
 
-/// One line of the ripple tables, which are stored as one list.
+/// One harmonic of the ripple tables, which are stored as one list.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RippleDef {
@@ -69,7 +69,7 @@ pub(crate) struct RippleDef {
     harmonic: u32,
     sine_nm: f64,
     cosine_nm: f64,
-    /// Absent in older logs.
+    /// Missing in older logs.
     #[serde(default)]
     sine_share: f64,
     #[serde(default)]
@@ -177,7 +177,7 @@ pub(crate) struct ContactLatchDef {
     reversal_s: f64,
     fade_s: f64,
     restore_s: f64,
-    /// Logs from before these four replay without them.
+    /// Older logs lack these four entries and are replayed without them.
     #[serde(default)]
     settle_s: f64,
     #[serde(default)]
@@ -270,7 +270,7 @@ fn max_rate_per_joint<const N: usize>() -> Vector<N> {
     Vector::repeat(1e4)
 }
 
-/// Older logs have a share of both thresholds instead of those of the move mode.
+/// Older logs contain a fraction of both thresholds instead of the thresholds of the move mode.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CollisionDef<const N: usize> {

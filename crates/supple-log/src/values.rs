@@ -1,4 +1,4 @@
-//! The values of a message, read one after another.
+//! Sequential reader of the values of a message.
 
 use crate::cdr;
 use crate::definition::{Count, Definitions, Field, Kind, MAX_FIELDS};
@@ -7,12 +7,12 @@ use cdr_encoding::CdrDeserializer;
 use serde::Deserialize;
 use std::fmt::Write;
 
-/// The values of a message, one after the other.
+/// Sequential reader of the values of a message.
 pub(crate) struct Values<'a> {
     reader: CdrDeserializer<'a, LittleEndian>,
     bytes: usize,
     text: String,
-    /// Fields and elements that were skipped.
+    /// Number of fields and elements skipped so far.
     skipped: usize,
 }
 
@@ -27,7 +27,7 @@ impl<'a> Values<'a> {
         })
     }
 
-    /// The next value, as a cell has it.
+    /// Returns the next value as the text of a table cell.
     pub fn next(&mut self, kind: &Kind) -> Result<&str, String> {
         self.text.clear();
         let written = match kind {
@@ -56,13 +56,13 @@ impl<'a> Values<'a> {
         Ok(&self.text)
     }
 
-    /// Debug prints a number with the digits that read back as the same number, and no more.
+    /// Prints the next number in its debug format: the shortest digits that read back as the same number.
     fn print<T: Deserialize<'a> + std::fmt::Debug>(&mut self) -> Result<std::fmt::Result, String> {
         let value: T = self.read()?;
         Ok(write!(self.text, "{value:?}"))
     }
 
-    /// The next value as a word: numbers as their bits, signed ones extended.
+    /// Returns the next value as a word: the bits of a number, sign-extended for a signed integer.
     pub fn word(&mut self, kind: &Kind) -> Result<u64, String> {
         Ok(match kind {
             Kind::Bool => u64::from(self.read::<bool>()?),
@@ -70,16 +70,20 @@ impl<'a> Values<'a> {
             Kind::Uint8 => u64::from(self.read::<u8>()?),
             Kind::Uint64 => self.read()?,
             Kind::Float64 => self.read::<f64>()?.to_bits(),
-            other => return Err(format!("no word for {other:?}")),
+            other => {
+                return Err(format!(
+                    "a value of type {other:?} has no representation as a word"
+                ));
+            }
         })
     }
 
-    /// The next value, a text.
+    /// Returns the next value, which must be a text.
     pub fn string(&mut self) -> Result<String, String> {
         self.read()
     }
 
-    /// Reads past a value of a field, or past all of them.
+    /// Skips all values of a field.
     pub fn skip(&mut self, definitions: &Definitions, field: &Field) -> Result<(), String> {
         self.count_skipped(&field.name)?;
         let count = match field.count {
@@ -103,7 +107,8 @@ impl<'a> Values<'a> {
         Ok(())
     }
 
-    /// Values without a size take no bytes: the length of the message does not limit their number.
+    /// Limits the number of skipped values: values of zero size take no bytes, so that the length of the message does not limit
+    /// their number.
     fn count_skipped(&mut self, name: &str) -> Result<(), String> {
         self.skipped += 1;
         match self.skipped > self.bytes + MAX_FIELDS {
@@ -127,7 +132,9 @@ impl<'a> Values<'a> {
     pub fn end(&self) -> Result<(), String> {
         match self.bytes - self.reader.bytes_consumed() {
             0 => Ok(()),
-            left => Err(format!("{left} bytes more than in its definition")),
+            left => Err(format!(
+                "the message has {left} bytes more than its definition"
+            )),
         }
     }
 }

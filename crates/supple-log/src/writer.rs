@@ -1,9 +1,9 @@
-//! Writing a log, a step at a time.
+//! Writes a log, step by step.
 
 use crate::cdr;
-use crate::emit::{Extras, Put, TF_EVERY, Topic, base_frame, emit};
+use crate::emit::{Extras, MessageSink, TF_EVERY, Topic, base_frame, emit};
 use crate::error::LogError;
-use crate::file::{LogFile, SOFTWARE, Written};
+use crate::file::{LogFile, LogSummary, SOFTWARE};
 use mcap::records::MessageHeader;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -18,18 +18,18 @@ use supple_model::Description;
 pub struct RunInfo {
     /// Name of the experiment.
     pub experiment: String,
-    /// Seed of everything random in it.
+    /// Seed of all random numbers of the run.
     pub seed: Option<u64>,
-    /// When it began \[ns\]: since the epoch, or 0 in virtual time.
+    /// Start time \[ns\]: since the epoch, or 0 in virtual time.
     pub start_ns: u64,
-    /// Whatever else belongs to it, by name.
+    /// Further notes, by name.
     pub notes: BTreeMap<String, String>,
 }
 
-/// Writes a log. Dropped without [`Writer::finish`] it leaves `<name>.part`, never a file of the name.
+/// Writer of a log. If it is dropped without [`Writer::finish`], only `<name>.part` exists, never a file with the final name.
 ///
-/// A write allocates nothing once buffers have grown, except on `/tf` and where a request, a fault or a
-/// refusal is there; it may wait for the disk.
+/// Once its buffers have grown, a write allocates only for messages on `/tf` and for steps with a request, a fault or a
+/// refusal; it may wait for the disk.
 pub struct Writer<const N: usize> {
     channels: Channels,
     description: Description,
@@ -46,8 +46,8 @@ impl<const N: usize> Writer<N> {
     /// `config` is the configuration in force, which may differ from that of `description`.
     ///
     /// # Errors
-    /// [`LogError::Create`], [`LogError::Busy`] or [`LogError::Write`]; [`LogError::Model`] where the
-    /// description has not `N` joints.
+    /// [`LogError::Create`], [`LogError::Busy`] or [`LogError::Write`]; [`LogError::Model`] if the
+    /// description does not have `N` joints.
     pub fn create(
         path: &Path,
         description: &Description,
@@ -59,7 +59,7 @@ impl<const N: usize> Writer<N> {
         let mut file = LogFile::create(path, ".part")?;
         let controller =
             crate::config::to_toml(config).map_err(|error| file.unwritable(error.to_string()))?;
-        file.metadata("supple", about(description, run))?;
+        file.metadata("supple", run_metadata(description, run))?;
         if !run.notes.is_empty() {
             file.metadata("notes", run.notes.clone())?;
         }
@@ -88,11 +88,11 @@ impl<const N: usize> Writer<N> {
         })
     }
 
-    /// One step. `time_ns` is the time of the measurement: since the epoch, or since the start in
+    /// Writes one step. `time_ns` is the time of the measurement: since the epoch, or since the start in
     /// virtual time.
     ///
     /// # Errors
-    /// [`LogError::Write`]; everything after it fails too.
+    /// [`LogError::Write`]; all later writes then fail too.
     pub fn write(
         &mut self,
         time_ns: u64,
@@ -106,7 +106,7 @@ impl<const N: usize> Writer<N> {
         self.write_record(time_ns, &record, extras)
     }
 
-    /// One step that is a record already, such as another process has sent; `extras.step` is not used.
+    /// Writes one step from its record, for example a record that another process has sent; `extras.step` is not used.
     ///
     /// # Errors
     /// As [`Writer::write`].
@@ -126,8 +126,8 @@ impl<const N: usize> Writer<N> {
         Ok(())
     }
 
-    /// What happened to the arm besides, such as a button of its pendant, with its time as in
-    /// [`Writer::write`]. It may be written late: the file has it at this place, with its own time.
+    /// Writes another event of the arm, such as a button of its pendant, with its time as in
+    /// [`Writer::write`]. An event may be written late: it keeps its own time.
     ///
     /// # Errors
     /// [`LogError::Write`].
@@ -138,12 +138,12 @@ impl<const N: usize> Writer<N> {
         self.channels.put(Topic::ArmEvents, number, time_ns, &text)
     }
 
-    /// Writes the index, waits for the disk and gives the file its name; an older file of that name is
-    /// replaced.
+    /// Writes the index, syncs the file to disk and renames it to its final name; this replaces an older file of that
+    /// name.
     ///
     /// # Errors
-    /// [`LogError::Write`]; the file then keeps its `.part`.
-    pub fn finish(self) -> Result<Written, LogError> {
+    /// [`LogError::Write`]; the file then keeps the suffix `.part`.
+    pub fn finish(self) -> Result<LogSummary, LogError> {
         self.channels.file.finish()
     }
 }
@@ -153,11 +153,11 @@ struct Channels {
     ids: [Option<u16>; Topic::COUNT],
     dof: usize,
     buffer: Vec<u8>,
-    /// Words of a record, while it is written.
+    /// Buffer for the words of a record.
     words: Vec<u64>,
 }
 
-impl Put for Channels {
+impl MessageSink for Channels {
     fn words(&mut self) -> &mut Vec<u64> {
         &mut self.words
     }
@@ -194,8 +194,8 @@ impl Channels {
     }
 }
 
-fn about(description: &Description, run: &RunInfo) -> BTreeMap<String, String> {
-    let mut about = BTreeMap::from([
+fn run_metadata(description: &Description, run: &RunInfo) -> BTreeMap<String, String> {
+    let mut metadata = BTreeMap::from([
         ("software".to_owned(), SOFTWARE.to_owned()),
         ("arm".to_owned(), description.name().to_owned()),
         ("joints".to_owned(), description.joint_names().join(" ")),
@@ -203,7 +203,7 @@ fn about(description: &Description, run: &RunInfo) -> BTreeMap<String, String> {
         ("start_ns".to_owned(), run.start_ns.to_string()),
     ]);
     if let Some(seed) = run.seed {
-        about.insert("seed".to_owned(), seed.to_string());
+        metadata.insert("seed".to_owned(), seed.to_string());
     }
-    about
+    metadata
 }

@@ -4,7 +4,7 @@
 use supple_core::Config;
 use supple_core::controller::ConfigError;
 
-/// First entry above its upper limit, if any.
+/// Returns the first entry above its upper limit, if any.
 pub(crate) fn first_out_of_range<const N: usize>(config: &Config<N>) -> Option<ConfigError> {
     let limits = &config.limits;
     let one = |entry: &'static str, value: f64, max: f64, must: &'static str| {

@@ -12,9 +12,9 @@ use supple_core::controller::ConfigError;
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::{Arm, Body, Config, Controller, Friction, Joint, Matrix, Pose, Vector};
 
-/// Default stiffness of the joint impedance mode as a fraction of the move mode's.
+/// Default stiffness of the joint impedance mode as a fraction of the stiffness of the move mode.
 const DEFAULT_IMPEDANCE_STIFFNESS: f64 = 0.02;
-/// Default damping of the joint impedance mode as a fraction of the move mode's.
+/// Default damping of the joint impedance mode as a fraction of the damping of the move mode.
 const DEFAULT_IMPEDANCE_DAMPING: f64 = 0.1;
 /// Default collision threshold as a fraction of the joint's torque limit.
 const DEFAULT_COLLISION_FRACTION: f64 = 0.3;
@@ -36,7 +36,7 @@ impl<const N: usize> Parts<N> {
     /// Builds the arm from these parts.
     ///
     /// # Errors
-    /// As the constructor of [`Arm`].
+    /// Errors of the constructor of [`Arm`].
     pub fn build(&self) -> Result<Arm<N>, supple_core::ArmError> {
         Arm::new(
             &self.joints,
@@ -48,7 +48,7 @@ impl<const N: usize> Parts<N> {
 }
 
 impl Description {
-    /// The parts of the arm, tool included.
+    /// Returns the parts of the arm, including the tool.
     ///
     /// # Errors
     /// [`ModelError::JointCount`] if the arm does not have `N` moving joints.
@@ -70,7 +70,7 @@ impl Description {
         })
     }
 
-    /// The arm with its tool.
+    /// Returns the arm with its tool.
     ///
     /// # Errors
     /// [`ModelError::JointCount`] if the arm does not have `N` moving joints.
@@ -81,7 +81,7 @@ impl Description {
         })
     }
 
-    /// Pose that the arm starts from \[rad\].
+    /// Returns the home pose \[rad\].
     ///
     /// # Errors
     /// [`ModelError::JointCount`] if the arm does not have `N` moving joints.
@@ -90,8 +90,8 @@ impl Description {
         Ok(Vector::from_column_slice(self.home_rad()))
     }
 
-    /// Controller configuration of this arm. Settings that its files leave out have values that suit no arm in particular:
-    /// a controller needs those of [`Description::completed`].
+    /// Returns the controller configuration of this arm. Settings that are missing in its files have placeholder values;
+    /// a controller needs the values of [`Description::completed`].
     ///
     /// # Errors
     /// [`ModelError::JointCount`] if the arm does not have `N` moving joints; [`ModelError::Invalid`] for values that

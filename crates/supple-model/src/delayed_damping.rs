@@ -1,9 +1,9 @@
-//! Damping at the joints that the delay of the loop does not allow in some pose.
+//! Check for joint damping that is unstable in some pose because of the delay of the loop.
 //!
 //! With a delayed velocity, damping `D` of joints with mass matrix `H` is stable while the greatest eigenvalue of
-//! `H^-1 D` times the delay stays below `pi/2`. The core reduces the gains of moves and of soft stops by pose; those of
-//! gravity hold and of held joints it applies as they are: those of gravity hold in any pose, those of held joints with these
-//! at their angles.
+//! `H^-1 D` times the delay stays below `pi/2`. The core reduces the gains of moves and of soft stops by pose, but applies the
+//! gains of gravity hold and of held joints unchanged: gravity hold must be stable in any pose, held joints with their joints at
+//! their angles.
 
 use crate::description::Description;
 use crate::error::ModelError;
@@ -17,9 +17,9 @@ use supple_core::dynamics::crba;
 use supple_core::{Config, Controller, Matrix, Vector};
 use toml_edit::value;
 
-/// Damping rate times delay that a lower control rate leaves: three quarters of the limit.
+/// Maximum damping rate times delay at a lower control rate: three quarters of the limit.
 const MARGIN: f64 = 0.75 * FRAC_PI_2;
-/// Least share of the given gains to which they are reduced: an inertia that allows less is wrong.
+/// Minimum factor by which gains are reduced: if a smaller factor were needed, an inertia would be wrong.
 const MIN_SHARE: f64 = 0.3;
 /// Number of poses.
 const POSES: u32 = 100;
@@ -36,7 +36,8 @@ impl Description {
         }
     }
 
-    /// Share of the damping of gravity hold, and of held joints, that keeps the margin at the arm's control rate: at most 1.
+    /// Returns the factors, at most 1, of the damping of gravity hold and of held joints that keep the margin at the arm's
+    /// control rate.
     pub(crate) fn allowed_damping_shares<const N: usize>(&self) -> [f64; 2] {
         let config = self.config::<N>().ok();
         let controller = config.and_then(|config| Controller::new(config).ok());
@@ -46,11 +47,11 @@ impl Description {
         })
     }
 
-    /// The same arm with the damping of gravity hold and the gains of held joints reduced in its TOML as far as its inertias and
-    /// the delay of the loop ask for, a margin included; and the shares that are left of both, 1 for what is unchanged.
+    /// Returns the same arm with the damping of gravity hold and the gains of held joints reduced in its TOML as far as its
+    /// inertias and the delay of the loop require, including a margin; and both factors, which are 1 for unchanged gains.
     ///
     /// # Errors
-    /// As [`Description::completed`] if less than three tenths of the gains would be left: then an inertia is wrong; any
+    /// The error of [`Description::completed`] if a factor were less than 0.3, because then an inertia is wrong; any
     /// [`ModelError`] of the edited text.
     pub fn with_stable_damping<const N: usize>(
         &self,
@@ -86,7 +87,7 @@ impl Description {
         Ok((reduced, shares))
     }
 
-    /// Multiplies the damping of gravity hold, and the gains of held joints, by these shares.
+    /// Multiplies the damping of gravity hold, and the gains of held joints, by these factors.
     pub(crate) fn reduce_damping(&mut self, [hold, held]: [f64; 2]) {
         for joint in &mut self.joints {
             joint.gains.hold_damping_nm_s_per_rad *= hold;
@@ -98,8 +99,8 @@ impl Description {
     }
 }
 
-/// The largest damping rate times delay over the poses, of gravity hold and of the held joints: each with the joint that
-/// moves most in it.
+/// Returns the largest damping rate times delay over the poses, of gravity hold and of the held joints, each with the joint that
+/// has the largest motion in it.
 fn rates_times_delay<const N: usize>(controller: &Controller<N>) -> [(ConfigError, f64); 2] {
     let config = controller.config();
     let held = Vector::<N>::from_fn(|joint, _| match config.roles[joint] {
@@ -144,7 +145,7 @@ fn rates_times_delay<const N: usize>(controller: &Controller<N>) -> [(ConfigErro
     })
 }
 
-/// The joint that moves most in the motion that this damping slows fastest in a pose, and the rate \[1/s\].
+/// Returns the rate of the motion that this damping slows fastest in a pose \[1/s\], and the joint that moves most in it.
 fn fastest<const N: usize>(
     config: &Config<N>,
     damping: &Vector<N>,
@@ -153,7 +154,7 @@ fn fastest<const N: usize>(
     let inverse = crba(&config.arm, pose_rad).try_inverse()?;
     let root = damping.map(f64::sqrt);
     let rates = Matrix::<N, N>::from_fn(|i, j| root[i] * inverse[(i, j)] * root[j]);
-    // As a matrix of variable size: its eigenvalues are found for any number of joints.
+    // A matrix of variable size has an eigenvalue solver for any number of joints.
     let rates = DMatrix::from_column_slice(N, N, rates.as_slice());
     let eigen = SymmetricEigen::new(rates);
     let (motion, rate_per_s) = eigen.eigenvalues.argmax();
@@ -164,7 +165,7 @@ fn fastest<const N: usize>(
 mod tests {
     use super::*;
 
-    /// A light rotor of a held joint leaves less of its gains, so that a controller takes the arm; other arms stay as they are.
+    /// The gains of a held joint with a light rotor are reduced, so that a controller accepts the arm; other arms are unchanged.
     #[test]
     fn gains_of_a_held_joint_are_reduced_to_its_inertia() {
         let wam4 = Description::asset("wam4").expect("built in");

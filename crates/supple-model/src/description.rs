@@ -87,8 +87,8 @@ impl Description {
         Self::asset(name_or_path)
     }
 
-    /// As [`Description::find`], with everything that a controller needs ([`Description::completed`]); `rate_hz`, if given,
-    /// replaces the control rate of the TOML \[Hz\].
+    /// Does the same as [`Description::find`], and adds all settings that a controller needs ([`Description::completed`]);
+    /// `rate_hz`, if given, replaces the control rate of the TOML \[Hz\].
     ///
     /// # Errors
     /// As [`Description::find`], [`Description::completed`] and [`Description::at_rate`].
@@ -134,7 +134,7 @@ impl Description {
         )
     }
 
-    /// As [`Description::from_text`], with a name of the URDF for messages.
+    /// Does the same as [`Description::from_text`], with a name of the URDF for messages.
     pub(crate) fn from_named_text(
         toml: &str,
         urdf_file: &str,
@@ -180,7 +180,7 @@ impl Description {
             &tree::ChainSettings {
                 tip_frame: &settings.tip_frame,
                 fixed: &settings.fixed_joints_rad,
-                // A TOML that lists joints counts them.
+                // If the TOML lists joints, their number is given.
                 freeze_on_path: settings.joints.is_empty() && settings.home_rad.is_none(),
                 repair: settings.repair_inertia,
             },
@@ -214,10 +214,10 @@ impl Description {
         })
     }
 
-    /// Ignored content of the URDF, each kind once with its first occurrence: Gazebo's elements, `mu_coulomb`, an
-    /// `<origin>` of a link. Dynamics and limits do not depend on it; unknown content that could change them is
-    /// rejected. Then the joints that were frozen, the inertias that were replaced and the tip that was chosen without a
-    /// word of the TOML or of the caller. Empty for the built-in arms.
+    /// Returns the ignored content of the URDF, each kind once with its first occurrence: Gazebo's elements, `mu_coulomb`, an
+    /// `<origin>` of a link. Dynamics and limits do not depend on this content; unknown content that could change them is
+    /// rejected. Then follow the joints that were frozen, the inertias that were replaced and the tip that was chosen without
+    /// an entry in the TOML or a request of the caller. Empty for the built-in arms.
     pub fn warnings(&self) -> &[Finding] {
         &self.warnings
     }
@@ -246,8 +246,8 @@ impl Description {
         }
     }
 
-    /// Returns the same arm with another control rate \[Hz\]; the period is rounded to whole nanoseconds. Where the longer
-    /// delay of a lower rate does not allow the damping of gravity hold or of held joints, it is reduced, with the stiffness
+    /// Returns the same arm with another control rate \[Hz\]; the period is rounded to whole nanoseconds. If the damping of
+    /// gravity hold or of held joints is unstable with the longer delay of a lower rate, it is reduced, with the stiffness
     /// of held joints.
     ///
     /// # Errors
@@ -261,65 +261,65 @@ impl Description {
         let slower = period_s > self.settings.period_s;
         self.settings.period_s = period_s;
         if slower {
-            // An arm with a number of joints that no controller has keeps its values: its configuration is an error.
+            // An arm with a number of joints that no controller supports keeps its values, because its configuration is an error.
             let shares = crate::with_dof!(self.dof(), N => self.allowed_damping_shares::<N>());
             self.reduce_damping(shares.unwrap_or([1.0; 2]));
         }
         Ok(self)
     }
 
-    /// Name of the arm.
+    /// Returns the name of the arm.
     pub fn name(&self) -> &str {
         &self.settings.name
     }
 
-    /// Number of moving joints, held ones included.
+    /// Returns the number of moving joints, including held joints.
     pub fn dof(&self) -> usize {
         self.joints.len()
     }
 
-    /// Names of the moving joints, from the base to the tip.
+    /// Returns the names of the moving joints, from the base to the tip.
     pub fn joint_names(&self) -> &[String] {
         &self.names
     }
 
-    /// Text of the URDF, unchanged but for declarations of XML prefixes that it lacks.
+    /// Returns the text of the URDF, unchanged except for added declarations of missing XML prefixes.
     pub fn urdf(&self) -> &str {
         &self.urdf
     }
 
-    /// Text of the TOML, unchanged.
+    /// Returns the text of the TOML, unchanged.
     pub fn toml(&self) -> &str {
         &self.toml
     }
 
-    /// Parsed TOML, with the defaults of missing sections filled in.
+    /// Returns the parsed TOML, with the defaults of missing sections.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
 
-    /// Pose that the arm starts from, one angle per joint \[rad\].
+    /// Returns the home pose, one angle per joint \[rad\].
     pub fn home_rad(&self) -> &[f64] {
         &self.home_rad
     }
 
-    /// Pose in which the arm stays without torque, one angle per joint \[rad\]; `None` if the TOML gives none.
+    /// Returns the pose in which the arm stays without torque, one angle per joint \[rad\]; `None` if the TOML gives none.
     pub fn stow_rad(&self) -> Option<&[f64]> {
         self.stow_rad.as_deref()
     }
 
-    /// Drives as their bus addresses them; `None` if the TOML has no `[bus]`.
+    /// Returns the settings of the drives on their bus; `None` if the TOML has no `[bus]`.
     pub fn bus(&self) -> Option<&BusDescription> {
         self.bus.as_ref()
     }
 
-    /// Whether the arm falls without torque: motors on a `[bus]` have no brakes, while those of a WAM brake when
+    /// Returns whether the arm falls without torque: motors on a `[bus]` have no brakes, while the motors of a WAM brake when
     /// shorted.
     pub fn falls_without_torque(&self) -> bool {
         self.bus.is_some()
     }
 
-    /// Whether the impedance law acts on each joint: on those that the TOML does not hold.
+    /// Returns for each joint whether the impedance law acts on it: the law acts on joints that the TOML does not hold.
     pub fn active_joints(&self) -> Vec<bool> {
         self.joints
             .iter()
@@ -327,37 +327,37 @@ impl Description {
             .collect()
     }
 
-    /// Friction, one per joint.
+    /// Returns the friction of each joint.
     pub fn friction(&self) -> &[Friction] {
         &self.friction
     }
 
-    /// Motors and transmission.
+    /// Returns motors and transmission.
     pub fn motors(&self) -> &Motors {
         &self.motors
     }
 
-    /// Whether the TOML describes the motors, in `[motors]`.
+    /// Returns whether the TOML describes the motors, in `[motors]`.
     pub fn describes_motors(&self) -> bool {
         self.settings.motors.is_some()
     }
 
-    /// Place and size of the paper's trajectories: those of the TOML, or as in the paper.
+    /// Returns place and size of the trajectories, from the TOML or else from the paper.
     pub fn paths(&self) -> Paths {
         self.settings.paths.map_or(Paths::PAPER, Paths::from)
     }
 
-    /// Tool at the tip.
+    /// Returns the tool at the tip.
     pub fn tool(&self) -> Option<Tool> {
         self.tool
     }
 
-    /// Simple shapes of the links, for drawing.
+    /// Returns simple shapes of the links, for drawing.
     pub fn capsules(&self) -> &[Capsule] {
         &self.capsules
     }
 
-    /// Pose of every URDF link in its parent link, at joint angles `q_rad`, one per moving joint: the data of
+    /// Returns the pose of every URDF link in its parent link, at joint angles `q_rad`, one per moving joint: the data of
     /// a transform tree.
     ///
     /// # Errors
@@ -367,17 +367,17 @@ impl Description {
         Ok(shapes::transforms(&self.robot, &self.chain, q_rad))
     }
 
-    /// Joints that do not move, with their positions \[rad, m for a prismatic joint\].
-    pub(crate) fn frozen(&self) -> &crate::frozen::Frozen {
+    /// Returns the joints that do not move, with their positions \[rad, m for a prismatic joint\].
+    pub(crate) fn frozen(&self) -> &crate::frozen::FrozenJoints {
         &self.chain.frozen
     }
 
-    /// Name of the TOML's file, for messages.
+    /// Returns the file name of the TOML, for messages.
     pub(crate) fn toml_file(&self) -> &str {
         &self.toml_file
     }
 
-    /// The same arm with a TOML that says more; the warnings stay those of what was given.
+    /// Returns the same arm with an extended TOML; the warnings stay those of the given files.
     pub(crate) fn with_toml(&self, toml: String) -> Result<Self, ModelError> {
         let settings = parse_toml(&self.toml_file, &toml)?;
         let mut description = Self::build(

@@ -5,7 +5,7 @@ use supple_core::ArmError;
 /// Error of reading, checking or using a description.
 #[derive(Debug, thiserror::Error)]
 pub enum ModelError {
-    /// A file that cannot be read.
+    /// A file cannot be read.
     #[error("{file}: cannot be read: {error}; {remedy}")]
     Read {
         /// Path as the caller gave it.
@@ -15,7 +15,7 @@ pub enum ModelError {
         /// Suggested remedy.
         remedy: &'static str,
     },
-    /// A file that cannot be written.
+    /// A file cannot be written.
     #[error(
         "{file}: cannot be written: {error}; name a folder in which a regular file can be written"
     )]
@@ -25,7 +25,7 @@ pub enum ModelError {
         /// Error of the operating system.
         error: std::io::Error,
     },
-    /// A file that cannot be parsed, or that contains unknown keys or wrong types. The message of the parser
+    /// A file cannot be parsed, or contains unknown keys or wrong types. The message of the parser
     /// contains line, column and the expected token.
     #[error("{file}: {message}\n{remedy}")]
     Syntax {
@@ -36,16 +36,16 @@ pub enum ModelError {
         /// Suggested remedy.
         remedy: &'static str,
     },
-    /// An element with an invalid value.
+    /// An element has an invalid value.
     #[error(transparent)]
     Invalid(Box<Finding>),
-    /// A URDF with ignored content, if strict reading was requested.
+    /// A URDF has ignored content, and strict reading was requested.
     #[error("{}; remove it, or load the arm without strict", lines(findings))]
     Strict {
         /// Ignored content, each kind once.
         findings: Vec<Finding>,
     },
-    /// An arm that is not built in.
+    /// The requested arm is not built in.
     #[error(
         "no arm named `{found}` is built in; the built-in arms are {expected}; another \
          arm is given by the path of its TOML"
@@ -56,7 +56,7 @@ pub enum ModelError {
         /// Known names.
         expected: String,
     },
-    /// A file that is not named like a URDF.
+    /// A file does not have the name of a URDF.
     #[error("{file}: the name of a URDF ends with .urdf or .xml; rename the file")]
     NotUrdf {
         /// File name.
@@ -74,7 +74,7 @@ pub enum ModelError {
         /// Number of joints of the arm.
         found: usize,
     },
-    /// A number of joints that no controller is compiled for.
+    /// No controller is compiled for this number of joints.
     #[error(
         "an arm of {found} moving joints is not supported, 3 to 7 are; fix joints of the arm at an \
          angle under [fixed_joints_rad], or set tip_frame to another link"
@@ -83,7 +83,7 @@ pub enum ModelError {
         /// Number of joints of the arm.
         found: usize,
     },
-    /// Each part is valid, but together they do not form a valid arm.
+    /// The parts are valid, but do not form a valid arm.
     #[error("{file}: {error}; correct the named element in the URDF or the TOML")]
     Arm {
         /// File of the description.
@@ -99,7 +99,7 @@ pub enum ModelError {
 pub struct Finding {
     /// File that contains the element.
     pub file: String,
-    /// The element, in words that can be searched for in the file.
+    /// The element, in words that occur in the file.
     pub element: String,
     /// The problem.
     pub problem: String,

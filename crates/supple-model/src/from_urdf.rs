@@ -10,8 +10,8 @@ use std::path::Path;
 use toml_edit::{DocumentMut, value};
 
 impl Description {
-    /// Reads an arm from a URDF alone. Its TOML gives name, URDF and tip only, see [`Description::completed`]. Without a tip
-    /// it is the end of the chain with the most movable joints, and a warning says which: this may be a finger.
+    /// Reads an arm from a URDF alone. Its TOML contains only name, URDF and tip, see [`Description::completed`]. Without a given
+    /// tip, the tip is the end of the chain with the most movable joints. A warning names this link, because it may be a finger.
     ///
     /// # Errors
     /// [`ModelError`] if the file cannot be read or is invalid, if it has no movable joint, or if several chains are equally
@@ -57,16 +57,16 @@ impl Description {
 
 /// End of the chain with the most movable joints.
 struct ChainEnd {
-    /// Its last link.
+    /// Last link of the chain.
     tip: String,
-    /// Its last movable joint.
+    /// Last movable joint of the chain.
     last_joint: String,
-    /// The link that this joint moves against.
+    /// Parent link of this joint.
     link_before: String,
 }
 
-/// A joint, by its child link.
-struct Parent<'a> {
+/// The joint that moves a given link.
+struct ParentJoint<'a> {
     joint: &'a str,
     link: &'a str,
     moves: bool,
@@ -80,10 +80,10 @@ impl ChainEnd {
             .children()
             .filter(|node| node.has_tag_name("joint"))
             .collect();
-        let mut parents: BTreeMap<&str, Parent<'_>> = BTreeMap::new();
+        let mut parents: BTreeMap<&str, ParentJoint<'_>> = BTreeMap::new();
         for joint in &joints {
             if let (Some(link), Some(child)) = (link_of(joint, "parent"), link_of(joint, "child")) {
-                let parent = Parent {
+                let parent = ParentJoint {
                     joint: joint.attribute("name").unwrap_or_default(),
                     link,
                     moves: moves(joint),
@@ -105,7 +105,7 @@ impl ChainEnd {
             }
             moving
         };
-        let ends: Vec<(&str, Vec<&Parent<'_>>)> = parents
+        let ends: Vec<(&str, Vec<&ParentJoint<'_>>)> = parents
             .keys()
             .filter(|link| !with_children.contains(*link))
             .map(|link| (*link, movable(link)))
@@ -114,7 +114,7 @@ impl ChainEnd {
         let longest = ends
             .iter()
             .filter(|(_, moving)| Some(moving.len()) == length);
-        let longest: Vec<&(&str, Vec<&Parent<'_>>)> = longest.collect();
+        let longest: Vec<&(&str, Vec<&ParentJoint<'_>>)> = longest.collect();
         match longest.as_slice() {
             [] => Err(no_chain(report, &root, &joints)),
             [(_, moving), ..] if moving.is_empty() => Err(no_chain(report, &root, &joints)),
@@ -135,7 +135,8 @@ impl ChainEnd {
         }
     }
 
-    /// Says which link was chosen. Whether the last joint belongs to the arm or to a gripper, no URDF says.
+    /// Returns the warning that names the chosen link, because a URDF does not state whether the last joint belongs to the arm or
+    /// to a gripper.
     fn warning(&self, report: Reporter<'_>) -> Finding {
         Finding {
             file: report.file.to_owned(),
@@ -150,7 +151,7 @@ impl ChainEnd {
     }
 }
 
-/// Link that a joint names as its parent or child.
+/// Returns the link that a joint names as its parent or child.
 fn link_of<'a>(joint: &Node<'a, '_>, role: &str) -> Option<&'a str> {
     let mut ends = joint.children();
     ends.find(|child| child.has_tag_name(role))?
@@ -162,7 +163,7 @@ fn moves(joint: &Node<'_, '_>) -> bool {
     matches!(joint.attribute("type"), Some("revolute" | "continuous")) && !is_mimic
 }
 
-/// The error of a file without an arm. What it contains instead is its value.
+/// Returns the error of a file without an arm; the error's value is the content of the file.
 fn no_chain(report: Reporter<'_>, root: &Node<'_, '_>, joints: &[Node<'_, '_>]) -> ModelError {
     let mut kinds: BTreeMap<&str, usize> = BTreeMap::new();
     for joint in joints {

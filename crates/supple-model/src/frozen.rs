@@ -1,29 +1,29 @@
-//! Movable joints that do not move: those that the TOML fixes, those beside the way to the tip, and, if the TOML has no entry
-//! about single joints, those on the way that no controller of this crate moves (prismatic joints, mimics, and the first ones
-//! of a chain of more than seven).
+//! Movable joints that are frozen: joints that the TOML fixes, joints that are not on the path from the base to the tip, and, if
+//! the TOML has no entry about single joints, joints on the path that no controller moves (prismatic joints, mimics, and the
+//! first joints of a chain of more than seven).
 //!
-//! Each stays at the angle that the TOML gives, otherwise at zero or at the end of its range that is closest to zero; one
-//! warning lists the joints of each kind.
+//! Each frozen joint stays at the angle that the TOML gives, otherwise at zero or at the end of its range that is closest to
+//! zero; one warning lists the joints of each kind.
 
 use crate::error::{Finding, Reporter};
 use std::collections::BTreeMap;
 use urdf_rs::{JointType, Robot};
 
 /// Positions of the frozen joints by name \[rad, m for a prismatic joint\].
-pub(crate) type Frozen = BTreeMap<String, f64>;
+pub(crate) type FrozenJoints = BTreeMap<String, f64>;
 
 /// Maximum number of moving joints.
 const MAX_MOVING: usize = 7;
 
-/// The frozen joints, `given` by the TOML or found here. `path` are the joints from the root to the tip, in order;
-/// `on_path` allows to freeze some of them.
+/// Returns the frozen joints: the joints `given` by the TOML and those that this function finds. `path` are the joints from the
+/// root to the tip, in order; `on_path` permits freezing some of them.
 pub(crate) fn frozen(
     report: Reporter<'_>,
     robot: &Robot,
     path: &[usize],
     given: &BTreeMap<String, f64>,
     on_path: bool,
-) -> (Frozen, Vec<Finding>) {
+) -> (FrozenJoints, Vec<Finding>) {
     let mut frozen = given.clone();
     let mut warnings = Vec::new();
     let is_free = |joint: usize| {
@@ -78,12 +78,12 @@ pub(crate) fn frozen(
     (frozen, warnings)
 }
 
-/// Whether a controller here can move the joint.
+/// Returns whether a controller can move the joint.
 pub(crate) fn is_revolute(kind: &JointType) -> bool {
     matches!(kind, JointType::Revolute | JointType::Continuous)
 }
 
-/// Zero, or the end of the joint's range that is closest to it.
+/// Returns zero, or the end of the joint's range that is closest to zero.
 fn resting_position(joint: &urdf_rs::Joint) -> f64 {
     let (lower, upper) = (joint.limit.lower, joint.limit.upper);
     match joint.joint_type {

@@ -1,8 +1,8 @@
 //! Writes an identified model or other settings into a description (URDF and TOML).
 //!
 //! The texts are edited in place, so shapes, limits, gains and comments are kept. The inertia of each moving
-//! link, including all links fixed to it and the tool, goes into the `<inertial>` of that link; the fixed links
-//! lose theirs.
+//! link, including all links fixed to it and the tool, is written into the `<inertial>` of that link; the `<inertial>` of the
+//! fixed links is removed.
 
 use crate::description::Description;
 use crate::error::{ModelError, Reporter};
@@ -14,9 +14,9 @@ use supple_core::friction::LoadTorque;
 use supple_core::{Arm, Body, Friction, Pose};
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, Value, value};
 
-/// Name of the URDF beside the TOML of a saved description.
+/// File name of the URDF of a saved description.
 const URDF: &str = "arm.urdf";
-/// Name of the TOML.
+/// File name of the TOML of a saved description.
 const TOML: &str = "arm.toml";
 
 /// The model that replaces the model of a description.
@@ -69,7 +69,7 @@ impl Description {
     }
 
     /// Returns the same arm with other collision thresholds for the modes with stiff joint loops \[N m\], one per
-    /// joint; `None` keeps that of the description.
+    /// joint; `None` keeps the threshold of the description.
     ///
     /// # Errors
     /// [`ModelError::JointCount`]; any [`ModelError`] of the edited text.
@@ -136,7 +136,7 @@ impl Description {
         Description::from_text(&document.to_string(), self.urdf())
     }
 
-    /// Returns the same arm with thresholds of at least `minimum`; greater ones of the description stay. `joint_torque_nm`
+    /// Returns the same arm with thresholds of at least `minimum`; greater thresholds of the description stay. `joint_torque_nm`
     /// replaces the collision thresholds of the joints.
     ///
     /// # Errors
@@ -189,7 +189,7 @@ impl Description {
         Description::from_text(&document.to_string(), self.urdf())
     }
 
-    /// Returns the same arm with the held joints of `of`: those, at the same angles and with the same loops, and no other.
+    /// Returns the same arm that holds exactly the held joints of `of`, at the same angles and with the same gains.
     ///
     /// # Errors
     /// [`ModelError::JointCount`]; any [`ModelError`] of the edited text.
@@ -269,7 +269,7 @@ impl Description {
         let mut document = self.document()?;
         document["urdf"] = value(URDF);
         document["source"] = value(model.source);
-        // It belongs to the model that is replaced.
+        // This entry belongs to the model that is replaced.
         document.remove("learned");
         for i in 0..N {
             let joint = self.joint_table(&mut document, i)?;
@@ -288,7 +288,7 @@ impl Description {
         Ok(document.to_string())
     }
 
-    /// The table of a joint in the TOML, added if there is none.
+    /// Returns the table of a joint in the TOML; adds the table if it is missing.
     pub(crate) fn joint_table<'a>(
         &self,
         document: &'a mut DocumentMut,
@@ -405,7 +405,7 @@ fn friction(f: &Friction) -> InlineTable {
     table
 }
 
-/// The changes of one `<link>`.
+/// Returns the edits of one `<link>`.
 fn edit(
     link: &Node<'_, '_>,
     text: &str,
@@ -432,7 +432,7 @@ fn edit(
     }
 }
 
-/// Debug format prints numbers with enough digits to read back the same number.
+/// Returns the `<inertial>` element of a body. Debug format prints numbers with enough digits to read back the same number.
 fn inertial(body: &Body) -> String {
     let (c, i) = (&body.com_m, &body.inertia_kg_m2);
     format!(

@@ -22,7 +22,7 @@ struct WrongCount {
 }
 
 impl LearnedSettings {
-    /// The settings of the TOML for these terms.
+    /// Returns the settings of the TOML for these terms.
     pub fn new<const N: usize>(learned: &LearnedTerms<N>) -> LearnedSettings {
         let LearnedTerms { parameters, map } = learned;
         LearnedSettings {
@@ -44,7 +44,7 @@ impl LearnedSettings {
         }
     }
 
-    /// The terms; lists that are not given are zero.
+    /// Returns the terms; missing lists are zero.
     ///
     /// # Errors
     /// A list that does not have one entry per joint, or a map without 16 coefficients, as a message.
@@ -108,7 +108,7 @@ impl LearnedSettings {
 }
 
 impl Description {
-    /// Learned terms in force at the start; zero if the TOML has none.
+    /// Returns the initial learned terms; zero if the TOML has none.
     ///
     /// # Errors
     /// [`ModelError::Invalid`] for a list of the wrong length.
@@ -130,7 +130,7 @@ impl Description {
     }
 
     /// Returns the same arm with these learned terms as `[learned]` in its TOML, whose other text is kept; `source`
-    /// names where they come from.
+    /// is the origin of the terms.
     ///
     /// # Errors
     /// [`ModelError::JointCount`]; any [`ModelError`] of the edited text.

@@ -1,4 +1,4 @@
-//! The paper's own arm: its closed-form dynamics, and the parameter set it prints.
+//! The paper's own arm: its closed-form dynamics, and the printed parameter set.
 //!
 //! Three joints: base yaw `q1`, shoulder pitch `q2` measured from the horizontal and positive upwards,
 //! elbow `q3` relative to the upper arm. Link frames have x along the link, z along the joint axis.
@@ -17,9 +17,9 @@
 //! never entry by entry). The asset `paper3` is the physically consistent arm closest to it, for the simulator.
 //!
 //! Three observations on the printed parameters:
-//! - `Iz1 = Ix2 - Iy2' = Ix3 - Iy3' = 0.0917` to the last digit: the mark of a least-norm solution, for
-//!   columns in which `Iy2'` and `Iy3'` enter with the opposite sign to the others. `sin^2 + cos^2 = 1`
-//!   ties the columns, so that ten combinations of the twelve can be identified.
+//! - `Iz1 = Ix2 - Iy2' = Ix3 - Iy3' = 0.0917` to the last digit, which is typical of a least-norm solution with
+//!   columns in which `Iy2'` and `Iy3'` have the opposite sign to the others. Because `sin^2 + cos^2 = 1`, the
+//!   columns are linearly dependent, so that ten combinations of the twelve can be identified.
 //! - Link 3 is physically inconsistent: about its centre of mass, `Ix3` exceeds `Iy3 + Iz3`, and no change of
 //!   the unidentifiable parameters can repair it. Link 2 can be consistent.
 //! - The mass matrix is nevertheless positive definite over the whole workspace.
@@ -64,7 +64,7 @@ pub struct Parameters {
 }
 
 impl Parameters {
-    /// As printed. The link lengths are not in the paper: they are the WAM's, 0.55 m and 0.35 m.
+    /// The printed set. The link lengths are not in the paper; they are the lengths of the WAM, 0.55 m and 0.35 m.
     #[expect(clippy::approx_constant, reason = "m2r2 is a first moment, not pi / 4")]
     pub const PUBLISHED: Parameters = Parameters {
         iz1_kg_m2: 0.0917,
@@ -108,7 +108,7 @@ impl Parameters {
         "Iz1", "Ix2", "Iz2'", "Iy2'", "m2r2", "m3r3", "Ix3", "Iy3'", "Iz3'", "V1", "V2", "V3",
     ];
 
-    /// The ten combinations that torques can identify, with `m3` and `S` known, in the order of
+    /// Returns the ten combinations that torques can identify, with `m3` and `S` known, in the order of
     /// [`Parameters::BASE_NAMES`].
     pub fn base(&self) -> [f64; 10] {
         let [v1, v2, v3] = self.viscous_nm_s_per_rad;
@@ -140,7 +140,7 @@ impl Parameters {
         "V3",
     ];
 
-    /// Friction of each joint, the continuous form (3.2) with the default band.
+    /// Returns the friction of each joint, the continuous form (3.2) with the default band.
     pub fn friction(&self) -> [Friction; 3] {
         core::array::from_fn(|i| {
             Friction::coulomb(self.viscous_nm_s_per_rad[i], self.coulomb_nm[i])
@@ -199,9 +199,9 @@ impl Parameters {
         Vector3::new(r * c1, r * s1, self.l2_m * t.s2 + self.l3_m * t.s23)
     }
 
-    /// Bodies that have these parameters, in the paper's frames, ready for [`supple_core::Arm::new`]
+    /// Returns bodies with these parameters, in the paper's frames, for [`supple_core::Arm::new`]
     /// with the tip at `(l3, 0, 0)`. Data that the parameters do not determine are chosen: link 1 is a ball of
-    /// `m1_kg` about the origin, and all centres of mass lie on x. The bodies are not checked here: for the
+    /// `m1_kg` about the origin, and all centres of mass lie on x. This function does not check the bodies: for the
     /// printed set, `Arm::new` rejects link 3.
     pub fn joints(&self, m1_kg: f64, m2_kg: f64) -> [Joint; 3] {
         let upright = Pose::from_xyz_rpy([0.0; 3], [core::f64::consts::FRAC_PI_2, 0.0, 0.0]);

@@ -9,15 +9,15 @@ use supple_core::trajectory::{Arc, Probe, Quadrant, Sinusoid};
 
 /// Centre of the paper's sinusoid, to which all other lengths below are relative \[m\].
 const CENTRE_M: f64 = 0.6;
-/// Rest at the bottom of a probing stroke, over whose last half the force while pressing is averaged \[s\].
+/// Rest at the bottom of a probing stroke \[s\]; the pressing force is averaged over its last half second.
 pub const PROBE_DWELL_S: f64 = 1.0;
 /// Length of the stroke before the cap meets the face \[m\].
 const FACE_INTO_STROKE_M: f64 = 0.06;
 /// Number of columns of a probing run; the base rotates by one step between them.
 const COLUMNS: u32 = 2;
 
-/// Place and size of the paper's trajectories in the arm's workspace. Lengths and speeds are the paper's times `scale`,
-/// times stay.
+/// Place and size of the paper's trajectories in the arm's workspace. Lengths and speeds are those of the paper times `scale`;
+/// durations are those of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Paths {
     /// Distance of their centre from the base's vertical axis \[m\].
@@ -42,7 +42,7 @@ impl From<PathSettings> for Paths {
 }
 
 impl Paths {
-    /// Where the paper has them.
+    /// Place and size of the paper.
     pub const PAPER: Paths = Paths {
         radius_m: CENTRE_M,
         azimuth_rad: 0.0,
@@ -50,20 +50,20 @@ impl Paths {
         scale: 1.0,
     };
 
-    /// Unit vector from the base's vertical axis to the centre.
+    /// Returns the unit vector from the base's vertical axis to the centre.
     pub fn outward(&self) -> Vector3<f64> {
         let (sin, cos) = sin_cos(self.azimuth_rad);
         Vector3::new(cos, sin, 0.0)
     }
 
-    /// The point at `out_m` beyond and `up_m` above the centre in the paper \[m\].
+    /// Returns the point that is `out_m` beyond and `up_m` above the centre in the paper \[m\].
     fn point_m(&self, out_m: f64, up_m: f64) -> Vector3<f64> {
         let radius_m = self.radius_m + self.scale * out_m;
         let height_m = self.height_m + self.scale * up_m;
         self.outward() * radius_m + Vector3::z() * height_m
     }
 
-    /// Two periods of the sinusoid of figure 3a, at `speed` times its speed. Returns trajectory and duration \[s\].
+    /// Returns two periods of the sinusoid of figure 3a at `speed` times its speed: trajectory and duration \[s\].
     pub fn sinusoid(&self, speed: f64) -> (Trajectory, f64) {
         let mut sinusoid = Sinusoid::paper(speed);
         if *self != Paths::PAPER {
@@ -75,8 +75,8 @@ impl Paths {
         (Trajectory::Sinusoid(sinusoid), duration_s)
     }
 
-    /// Two periods of an arc about the base's vertical axis, 0.05 m beyond the centre, at `speed` times 0.2 m/s. Where
-    /// the paper has its centre, it moves the base joint by 0.4 rad to both sides. Returns trajectory and duration \[s\].
+    /// Returns two periods of an arc about the base's vertical axis, 0.05 m beyond the centre, at `speed` times 0.2 m/s:
+    /// trajectory and duration \[s\]. With the centre of the paper, the arc moves the base joint by 0.4 rad to both sides.
     pub fn arc(&self, speed: f64) -> (Trajectory, f64) {
         let mut arc = Arc {
             radius_m: 0.65,
@@ -99,8 +99,8 @@ impl Paths {
         (Trajectory::Arc(arc), 2.0 * period_s + 0.5 * arc.ramp_s)
     }
 
-    /// Two rounds of the quadrant of figure 3b in the vertical plane; `speed_m_per_s` is that of the paper's size.
-    /// Returns quadrant and duration \[s\].
+    /// Returns two laps of the quadrant of figure 3b in the vertical plane: quadrant and duration \[s\]. `speed_m_per_s` is the
+    /// speed at the paper's size.
     pub fn quadrant(&self, speed_m_per_s: f64) -> (Quadrant, f64) {
         let mut quadrant = Quadrant::vertical(speed_m_per_s);
         if *self != Paths::PAPER {
@@ -117,12 +117,12 @@ impl Paths {
         (quadrant, duration_s)
     }
 
-    /// Height of the face that the probing cycle meets \[m\].
+    /// Returns the height of the face that the probing cycle touches \[m\].
     pub fn face_m(&self) -> f64 {
         self.height_m
     }
 
-    /// The probing cycle over the block for a cap of this radius: two columns of two strokes each. Returns probe and
+    /// Returns the probing cycle over the block for a cap of this radius, two columns of two strokes each: probe and
     /// duration \[s\].
     pub fn probe(&self, tip_radius_m: f64) -> (Probe, f64) {
         let mut probe = Probe {
@@ -155,7 +155,8 @@ mod tests {
     use super::Paths;
     use supple_core::Trajectory;
 
-    /// At twice the speed the arc is where it was at twice the time, and takes half as long.
+    /// At twice the speed, the point of the arc at a time equals the point of the slow arc at twice that time, and the duration
+    /// is half.
     #[test]
     fn an_arc_at_twice_the_speed_is_the_same_path() {
         let placed = Paths {
@@ -180,9 +181,9 @@ mod tests {
         }
     }
 
-    /// Turned, moved and halved, every point of every path lies where the same point of the paper's path goes.
+    /// Every point of a placed path equals the rotated, displaced and halved point of the paper's path.
     #[test]
-    fn a_placed_path_is_the_papers_turned_moved_and_scaled() {
+    fn a_placed_path_is_the_papers_path_rotated_displaced_and_scaled() {
         let placed = Paths {
             radius_m: 0.4,
             azimuth_rad: 0.7,
@@ -215,7 +216,7 @@ mod tests {
                 }
             }
         }
-        // The arc and the probe keep their lengths times the scale.
+        // The lengths of the arc and of the probe are multiplied by the scale.
         let Trajectory::Arc(arc) = placed.arc(1.0).0 else {
             unreachable!("an arc");
         };

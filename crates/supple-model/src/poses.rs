@@ -2,7 +2,7 @@
 
 use supple_core::{Config, Vector};
 
-/// One of the evenly spread poses over the joint ranges; ranges wider than a turn hold no other poses.
+/// Returns one of the evenly spread poses over the joint ranges; a range wider than one turn counts as one turn.
 pub(crate) fn pose_rad<const N: usize>(config: &Config<N>, pose: u32) -> Vector<N> {
     const ROOTS: [f64; 7] = [
         core::f64::consts::SQRT_2,

@@ -1,4 +1,4 @@
-//! Start poses of a tip trajectory, and whether the arm can follow it from there.
+//! Start poses of a tip trajectory, and a check whether the arm can follow the trajectory from a pose.
 
 use nalgebra::Vector3;
 use supple_core::config::Role;
@@ -11,9 +11,9 @@ use supple_core::{Config, Trajectory, Vector};
 pub const REACH_CHECK_STEP_S: f64 = 0.05;
 /// Fractions of the joint ranges at which the search for a start pose begins.
 const SEEDS: [f64; 3] = [0.3, 0.5, 0.7];
-/// Evenly spread poses at which it begins otherwise.
+/// Number of evenly spread poses at which the search begins otherwise.
 const CANDIDATES: u32 = 100;
-/// Share of each joint's range in which they lie, around its middle.
+/// Fraction of each joint's range, around its middle, in which these poses lie.
 const RANGE_SHARE: f64 = 0.7;
 
 /// The first point of a trajectory that the arm does not reach.
@@ -23,20 +23,20 @@ pub struct OutOfReach {
     pub time_s: f64,
     /// The point, base axes \[m\].
     pub point_m: Vector3<f64>,
-    /// Distance of the nearest tip \[m\].
+    /// Distance of the nearest tip position that the arm reaches \[m\].
     pub distance_m: f64,
 }
 
-/// Indices of the active joints, in order from the base.
+/// Returns the indices of the active joints, in order from the base.
 pub fn active_joints<const N: usize>(config: &Config<N>) -> Vec<usize> {
     (0..N)
         .filter(|i| config.roles[*i] == Role::Active)
         .collect()
 }
 
-/// Joint angles that put the tip at the start of the trajectory, with the elbow as high as possible; checks that
-/// the whole trajectory can be reached from there. Where the third active joint is no elbow, or the trajectory leads out of
-/// reach, it is the pose farthest from a singular one among evenly spread poses.
+/// Returns joint angles with the tip at the start of the trajectory and the elbow as high as possible; checks that
+/// the arm can follow the whole trajectory from this pose. If the third active joint is no elbow, or the trajectory leads out of
+/// reach, returns the pose among evenly spread poses that is farthest from a singular pose.
 ///
 /// # Errors
 /// [`OutOfReach`] is the first point out of reach.
@@ -74,7 +74,7 @@ pub fn start_pose<const N: usize>(
     }))
 }
 
-/// The pose with the highest elbow that reaches a point, and the least distance reached \[m\].
+/// Returns the pose with the highest elbow that reaches a point, and the minimum distance to the point \[m\].
 fn highest_elbow<const N: usize>(
     config: &Config<N>,
     point_m: &Vector3<f64>,
@@ -142,7 +142,7 @@ pub fn follow<const N: usize>(
     Ok(poses)
 }
 
-/// Joint angles that bring the tip to a point, from a seed \[rad\].
+/// Returns joint angles that bring the tip to a point, from a seed \[rad\].
 pub(crate) fn solve<const N: usize>(
     config: &Config<N>,
     seed_rad: &Vector<N>,
@@ -157,14 +157,14 @@ pub(crate) fn solve<const N: usize>(
     )
 }
 
-/// Smallest singular value of the Jacobian of the tip's position \[m\]; zero where there is no law.
+/// Returns the smallest singular value of the Jacobian of the tip's position \[m\]; zero if the law is not defined.
 pub fn min_singular_value_m<const N: usize>(config: &Config<N>, q: &Vector<N>) -> f64 {
     let mut state = Terms::default();
     terms(&config.arm, q, &Vector::zeros(), &mut state);
     Task::new(&state, &config.roles).map_or(0.0, |task| task.min_singular_value_m)
 }
 
-/// Poses that are spread evenly over the middle of the joint ranges.
+/// Returns poses that are spread evenly over the middle of the joint ranges.
 pub fn spread_poses<const N: usize>(
     config: &Config<N>,
     count: u32,
@@ -178,7 +178,7 @@ pub fn spread_poses<const N: usize>(
     })
 }
 
-/// Element `index` of the Halton sequence of the `dimension`-th prime, between 0 and 1.
+/// Returns element `index` of the Halton sequence of the `dimension`-th prime, between 0 and 1.
 fn halton(mut index: u32, dimension: usize) -> f64 {
     const PRIMES: [u32; 7] = [2, 3, 5, 7, 11, 13, 17];
     let base = PRIMES[dimension % PRIMES.len()];

@@ -1,8 +1,8 @@
-//! The rigid body nearest to inertial data that no rigid body has.
+//! Replaces inertial data that no rigid body has by those of the nearest rigid body.
 //!
 //! A body has a positive mass and a positive definite second moment of mass `S = tr(I) / 2 - I` about its centre of mass
 //! (Wensing, Kim and Slotine, RA-L 3(1) 2018), which is the same as positive principal moments that satisfy the triangle
-//! inequality. The nearest one has the same mass and centre of mass and the eigenvalues of `S` raised to a small positive
+//! inequality. The nearest body has the same mass and centre of mass, and eigenvalues of `S` that are raised to a small positive
 //! number: the projection onto the consistent matrices in the Frobenius norm.
 
 use crate::error::{Finding, Reporter};
@@ -10,12 +10,12 @@ use nalgebra::SymmetricEigen;
 use supple_core::math::Matrix3;
 use supple_core::{Body, BodyError};
 
-/// Least second moment of mass along an axis, as a fraction of the greatest.
+/// Minimum second moment of mass along an axis, as a fraction of the greatest.
 const MIN_SHARE: f64 = 1e-3;
-/// Radius of the ball whose inertia a body without any usable one gets \[m\].
+/// Radius of the ball whose inertia a body without usable inertia receives \[m\].
 const BALL_RADIUS_M: f64 = 0.02;
 
-/// The nearest body; `None` if there is no mass to give it. `body` is about its centre of mass.
+/// Returns the nearest body; `None` without a mass. `body` is about its centre of mass.
 pub(crate) fn nearest(body: &Body) -> Option<Body> {
     let numbers = body.inertia_kg_m2.iter().chain(body.com_m.iter());
     if body.mass_kg <= 0.0 || !body.mass_kg.is_finite() || numbers.clone().any(|x| !x.is_finite()) {
@@ -40,7 +40,7 @@ pub(crate) fn nearest(body: &Body) -> Option<Body> {
     nearest.validate().is_ok().then_some(nearest)
 }
 
-/// Says what was replaced by what.
+/// Returns the warning that names the replaced and the new values.
 pub(crate) fn finding(
     report: Reporter<'_>,
     link: &str,
@@ -91,7 +91,7 @@ mod tests {
         }
     }
 
-    /// A triangle that does not close loses the same amount on its long side that its short ones gain.
+    /// If the moments violate the triangle inequality, the greatest is reduced by the amount by which the others increase.
     #[test]
     fn the_nearest_body_is_consistent_and_near() {
         for moments in [[1.0, 1.0, 3.0], [0.1, 0.0, 0.0], [0.7, 0.1, -0.2]] {
@@ -110,10 +110,10 @@ mod tests {
                 );
             }
         }
-        // What is consistent stays as it is.
+        // A consistent body is unchanged.
         let sound = body([1.0, 1.2, 1.5]);
         assert!((nearest(&sound).unwrap().inertia_kg_m2 - sound.inertia_kg_m2).norm() < 1e-12);
-        // Without a mass there is nothing to repair.
+        // A body without a mass cannot be repaired.
         assert!(
             nearest(&Body {
                 mass_kg: 0.0,
@@ -122,7 +122,7 @@ mod tests {
             .is_none()
         );
         assert!(nearest(&body([f64::NAN, 1.0, 1.0])).is_none());
-        // Without inertia it is a ball.
+        // A body without inertia becomes a ball.
         nearest(&body([0.0; 3])).unwrap().validate().unwrap();
     }
 }

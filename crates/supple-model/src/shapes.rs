@@ -1,7 +1,7 @@
-//! Poses and shapes of the links, for drawing and for transform trees. Not used by the dynamics.
+//! Poses and shapes of the links, for drawing and for transform trees. The dynamics do not use them.
 //!
 //! Shapes are the `<visual>` primitives of the URDF: a cylinder or a capsule becomes a capsule along its axis,
-//! a sphere one of zero length. Boxes and meshes have no capsule; viewers read them from the URDF.
+//! a sphere becomes a capsule of zero length. Boxes and meshes have no capsule; viewers read them from the URDF.
 
 use crate::tree::Chain;
 use supple_core::Pose;
@@ -11,9 +11,9 @@ use urdf_rs::{Geometry, JointType, Robot};
 /// A capsule fixed to a link.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule {
-    /// Moving joint of the link that carries it, counted from the base; `None` for the base itself.
+    /// Moving joint of the link that carries the capsule, counted from the base; `None` for the base.
     pub joint: Option<usize>,
-    /// Ends of its axis in that link's frame \[m\].
+    /// Ends of the capsule's axis in that link's frame \[m\].
     pub ends_m: [Vector3<f64>; 2],
     /// Radius \[m\].
     pub radius_m: f64,

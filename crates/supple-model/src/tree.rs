@@ -2,12 +2,12 @@
 //!
 //! The arm is the chain of movable joints from the root link to the tip frame. Links that are fixed to
 //! another link, by a `fixed` joint or because their joint is frozen ([`crate::frozen`]), are lumped into it:
-//! masses, first moments and inertias add, frames are composed. What hangs on the base has no effect and is not read.
-//! An inertia that no rigid body has is rejected on the way from the base to the tip, or replaced on request; on a side
-//! link it is always replaced, with a warning ([`crate::repair`]), as is a mass without inertia on a fixed link.
+//! masses, first moments and inertias add, frames are composed. Links that are fixed to the base have no effect and are not read.
+//! An inertia that no rigid body has is rejected on the path from the base to the tip, or replaced on request; on other
+//! links it is always replaced, with a warning ([`crate::repair`]), as is a mass without inertia on a fixed link.
 
 use crate::error::{Finding, ModelError, Reporter};
-use crate::frozen::{self, Frozen, is_revolute};
+use crate::frozen::{self, FrozenJoints, is_revolute};
 use crate::repair;
 use std::cell::RefCell;
 use std::collections::BTreeMap;
@@ -15,12 +15,12 @@ use supple_core::math::{Matrix3, Vector3, sin_cos};
 use supple_core::{Body, Pose};
 use urdf_rs::{JointType, Robot};
 
-/// A movable joint of the chain, with the link it moves.
+/// A movable joint of the chain, with the link that it moves.
 #[derive(Clone, Debug)]
 pub(crate) struct MovingJoint {
     /// Index in the URDF's list of joints.
     pub joint: usize,
-    /// Frame of the link in the frame of the link before, at zero angle.
+    /// Frame of the link in the frame of the previous link, at zero angle.
     pub parent_from_link: Pose,
     /// Unit axis in the link frame.
     pub axis: Vector3<f64>,
@@ -33,9 +33,9 @@ pub(crate) struct MovingJoint {
 pub(crate) struct PlacedLink {
     /// Index in the URDF's list of links.
     pub link: usize,
-    /// Moving joint whose link it belongs to, counted along the chain; `None` for the base.
+    /// Moving joint whose link carries this link, counted along the chain; `None` for the base.
     pub carrier: Option<usize>,
-    /// Its frame in the carrier's link frame.
+    /// Frame of this link in the frame of the carrier.
     pub carrier_from_link: Pose,
 }
 
@@ -46,19 +46,19 @@ pub(crate) struct Chain {
     pub links: Vec<PlacedLink>,
     pub last_link_from_tip: Pose,
     /// Joints that do not move.
-    pub frozen: Frozen,
-    /// What was frozen or replaced although nobody asked for it.
+    pub frozen: FrozenJoints,
+    /// Warnings about joints that were frozen and inertias that were replaced without a request.
     pub warnings: Vec<Finding>,
 }
 
-/// What the TOML states about the chain.
+/// Settings of the TOML about the chain.
 pub(crate) struct ChainSettings<'a> {
     pub tip_frame: &'a str,
     /// Joints that the TOML freezes, with their positions.
     pub fixed: &'a BTreeMap<String, f64>,
-    /// Whether joints on the way to the tip may be frozen too.
+    /// Whether joints on the path to the tip may also be frozen.
     pub freeze_on_path: bool,
-    /// Replaces every inertia that no rigid body has.
+    /// Whether to replace every inertia that no rigid body has.
     pub repair: bool,
 }
 
@@ -147,7 +147,7 @@ pub(crate) fn chain(
     })
 }
 
-/// Replaces the zero inertia of links with mass by that of a solid ball of `radius_m`.
+/// Replaces the zero inertia of links with mass by the inertia of a solid ball of `radius_m`.
 pub(crate) fn set_point_mass_inertia(robot: &mut Robot, radius_m: f64) {
     for link in &mut robot.links {
         let mass_kg = link.inertial.mass.value;
@@ -274,7 +274,7 @@ impl<'a> Tree<'a> {
         self.robot.links.iter().position(|link| link.name == name)
     }
 
-    /// Joints from the root to the tip.
+    /// Returns the joints from the root to the tip.
     fn path_to(&self, tip: usize) -> Vec<usize> {
         let mut path = Vec::new();
         let mut link = tip;
@@ -286,7 +286,7 @@ impl<'a> Tree<'a> {
         path
     }
 
-    /// Unit axis of a movable joint. The URDF format requires axes of unit length; published ones are rounded,
+    /// Returns the unit axis of a movable joint. The URDF format requires axes of unit length; published ones are rounded,
     /// so any finite length above 1e-6 is scaled to 1.
     fn axis(&self, joint: usize) -> Result<Vector3<f64>, ModelError> {
         let joint = &self.robot.joints[joint];
@@ -303,7 +303,7 @@ impl<'a> Tree<'a> {
         ))
     }
 
-    /// Pose of the child link, relative to its pose at zero, of a frozen joint at `position` (rad or m).
+    /// Returns the pose of the child link of a frozen joint at `position` (rad or m), relative to its pose at zero.
     fn displaced(&self, joint: usize, position: f64) -> Result<Pose, ModelError> {
         if position == 0.0 {
             return Ok(Pose::IDENTITY);
@@ -318,8 +318,8 @@ impl<'a> Tree<'a> {
         })
     }
 
-    /// Inertial data of a link as they are written, in its frame; `None` if there are none. The last part is the pose of
-    /// the centre of mass.
+    /// Returns the unmodified inertial data of a link in its frame, and the pose of the centre of mass; `None` if there are no
+    /// data.
     fn written_body(&self, link: usize) -> Option<(Body, Pose)> {
         let urdf_rs::Inertial {
             origin,
@@ -371,15 +371,15 @@ impl<'a> Tree<'a> {
 
 struct Builder<'a, 'b> {
     tree: &'b Tree<'a>,
-    frozen: &'b Frozen,
+    frozen: &'b FrozenJoints,
     on_chain: &'b dyn Fn(usize) -> bool,
-    /// Whether a link lies on the way from the base to the tip.
+    /// For each link, whether it is on the path from the base to the tip.
     on_path: &'b dyn Fn(usize) -> bool,
-    /// Replaces inconsistent inertias on that way too.
+    /// Whether to replace inconsistent inertias also on that path.
     repair: bool,
-    /// What was replaced.
+    /// Warnings about replaced inertias.
     repaired: RefCell<Vec<Finding>>,
-    /// Sum of everything lumped into the current moving link.
+    /// Sum of the bodies lumped into the current moving link.
     body: Option<Body>,
     /// Next joint of the chain, with the frame of its child link at zero angle.
     next: Option<(usize, Pose)>,
@@ -389,12 +389,12 @@ struct Builder<'a, 'b> {
 impl Builder<'_, '_> {
     /// Lumps the link `root` and all links fixed to it, parents before children.
     fn lump(&mut self, root: usize, carrier: Option<usize>) -> Result<(), ModelError> {
-        // Iterative, because the file determines the nesting depth.
+        // The traversal is iterative, because the file determines the nesting depth.
         let mut open = vec![(root, Pose::IDENTITY)];
         while let Some((link, carrier_from_link)) = open.pop() {
             let first = open.len();
             self.lump_one(link, carrier, carrier_from_link, &mut open)?;
-            // In file order: the rounding of the mass sums depends on it.
+            // The links are added in file order, on which the rounding of the mass sums depends.
             open[first..].reverse();
         }
         Ok(())
@@ -413,7 +413,7 @@ impl Builder<'_, '_> {
             carrier,
             carrier_from_link,
         });
-        // What is fixed to the base does not move and has no effect.
+        // A link that is fixed to the base does not move and has no effect.
         if carrier.is_some()
             && let Some(body) = self.body(link)?
         {
@@ -438,7 +438,7 @@ impl Builder<'_, '_> {
         Ok(())
     }
 
-    /// Inertia of a link in its frame; one that no rigid body has is replaced where that is allowed.
+    /// Returns the inertia of a link in its frame; replaces an inertia that no rigid body has, where this is permitted.
     fn body(&self, link: usize) -> Result<Option<Body>, ModelError> {
         let Some((body, frame)) = self.tree.written_body(link) else {
             return Ok(None);
@@ -497,7 +497,7 @@ fn check_chain_joint(report: Reporter<'_>, joint: &urdf_rs::Joint) -> Result<(),
     Ok(())
 }
 
-/// Rotation about a unit axis.
+/// Returns the rotation about a unit axis.
 pub(crate) fn turn(axis: &Vector3<f64>, angle_rad: f64) -> Pose {
     let onto = Pose::z_onto(axis);
     let (s, c) = sin_cos(angle_rad);

@@ -35,13 +35,13 @@ pub fn with_default_limits(urdf: &str) -> String {
     edited
 }
 
-/// The edit that adds a missing `<limit>` to a joint, or missing attributes to its `<limit>`.
+/// Returns the edit that adds a missing `<limit>` to a joint, or missing attributes to its `<limit>`.
 fn edit(joint: &Node<'_, '_>) -> Option<(Range<usize>, String)> {
     let limit = joint.children().find(|child| child.has_tag_name("limit"));
     let stated = |name: &str| limit.and_then(|limit| limit.attribute(name));
     let mut added = String::new();
     let mut dropped = Vec::new();
-    // A limit with only one end is an error and stays, so that the reader rejects it.
+    // A limit with only one end is an error and stays unchanged, so that the reader rejects it.
     if stated("lower").is_none() && stated("upper").is_none() {
         added += &format!(" lower=\"{:?}\" upper=\"{TAU:?}\"", -TAU);
     }

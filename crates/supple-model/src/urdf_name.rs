@@ -3,14 +3,14 @@
 /// Suffix of a name that replaces inertias that no rigid body has.
 const REPAIR: &str = ",repair";
 
-/// A URDF named as an arm.
+/// The name of an arm that is given as a URDF.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UrdfName {
     /// Path of the URDF.
     pub path: String,
     /// The link that is the tip; `None` leaves the choice to the reader.
     pub tip: Option<String>,
-    /// Replaces inertias that no rigid body has.
+    /// Whether to replace inertias that no rigid body has.
     pub repair: bool,
 }
 
@@ -30,7 +30,7 @@ impl UrdfName {
         })
     }
 
-    /// The name as one word, as [`UrdfName::parse`] reads it.
+    /// Returns the name as one word, which [`UrdfName::parse`] reads.
     pub fn to_text(&self) -> String {
         let repair = if self.repair { REPAIR } else { "" };
         match (&self.tip, self.repair) {
@@ -49,7 +49,7 @@ mod tests {
     use super::UrdfName;
 
     #[test]
-    fn a_name_is_read_as_it_is_written() {
+    fn a_written_name_is_read_back_unchanged() {
         for text in [
             "a/b.urdf",
             "a/b.urdf#tool0",

@@ -99,8 +99,8 @@ impl<const N: usize> ActuatorModel<N> {
         }
     }
 
-    /// Whether the amplifiers turn commands into other torques.
-    fn amplifiers_err(&self) -> bool {
+    /// Returns whether the torques of the amplifiers differ from the commands.
+    fn amplifiers_inexact(&self) -> bool {
         let zero = |values: &Vector<N>| values.iter().all(|x| *x == 0.0);
         let exact = self.torque_constant.iter().all(|k| *k == 1.0);
         !(exact
@@ -115,14 +115,14 @@ impl<const N: usize> ActuatorModel<N> {
 pub(crate) struct ActuatorState<const N: usize> {
     model: ActuatorModel<N>,
     motor_from_joint: Matrix<N, N>,
-    /// Commands that do not act yet, with the motors that were to be shorted meanwhile.
+    /// Commands that do not act yet, with the motors to be shorted until they act.
     pending: VecDeque<(Vector<N>, [bool; N])>,
     last_command: Vector<N>,
     /// Rounding error of each motor's torque that the next cycle adds \[N m\].
     remainder: Vector<N>,
     /// Whether motor torques differ from commands.
-    amplifiers_err: bool,
-    /// Motors to be shorted, and those that are: a motor stays shorted until its first torque acts.
+    amplifiers_inexact: bool,
+    /// Motors to be shorted, and motors that are shorted: a motor stays shorted until its first torque acts.
     to_short: [bool; N],
     shorted: [bool; N],
     /// Resulting joint-space damping matrix \[N m s/rad\].
@@ -179,7 +179,7 @@ impl<const N: usize> ActuatorState<N> {
             entry(valid, name, fraction, "finite")?;
         }
         let mut state = ActuatorState {
-            amplifiers_err: model.amplifiers_err(),
+            amplifiers_inexact: model.amplifiers_inexact(),
             model,
             motor_from_joint,
             pending: VecDeque::new(),
@@ -267,7 +267,7 @@ impl<const N: usize> ActuatorState<N> {
     /// Torque of the motors at the joints for the acting command `applied`, with motor angles that are `q` at the joints;
     /// without the braking of shorted motors.
     pub fn motor_torque(&self, applied: &Vector<N>, q: &Vector<N>) -> Vector<N> {
-        if !self.amplifiers_err {
+        if !self.amplifiers_inexact {
             return applied + self.ripple(q);
         }
         let model = &self.model;

@@ -71,7 +71,7 @@ impl Default for ForceSensor {
 /// Torque of hoses and wires along the arm: a spring over each joint angle, `-(k q + preload)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hose<const N: usize> {
-    /// `k` of each joint \[N m/rad\], zero or more; it is relaxed at the joint's zero but for the preload.
+    /// `k` of each joint \[N m/rad\], zero or more; without preload the spring is relaxed at the joint's zero.
     pub stiffness_nm_per_rad: Vector<N>,
     /// Torque against positive motion at the joint's zero \[N m\].
     pub preload_nm: Vector<N>,

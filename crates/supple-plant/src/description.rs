@@ -64,7 +64,7 @@ impl<const N: usize> PlantConfig<N> {
                 counts_per_motor_revolution: Vector::repeat(counts),
                 motor_torque_quantum_nm: quantum
                     .map_or_else(Vector::zeros, Vector::from_column_slice),
-                // The drive of these motors does.
+                // The drives of motors on a bus carry the remainder.
                 carries_remainder: description.bus().is_some(),
                 braking_nm_s_per_rad: braking.map_or_else(
                     || rotors_kg_m2.diagonal() / SHORTED_TIME_CONSTANT_S,
@@ -91,7 +91,7 @@ impl<const N: usize> PlantConfig<N> {
     }
 }
 
-/// The usual step of the physics \[s\], or the largest one below it of which a cycle is a whole number.
+/// Returns the usual physics step \[s\], or the largest smaller step that divides the cycle.
 fn step_s(cycle_s: f64, usual_s: f64) -> f64 {
     let steps = cycle_s / usual_s;
     if (steps - libm::rint(steps)).abs() < 1e-9 * steps {

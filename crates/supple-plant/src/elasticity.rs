@@ -5,10 +5,10 @@
 //! s = K slack(theta - q) + D (w - q')                  theta' = w
 //! ```
 //!
-//! `theta = m2jp p` are the motor angles `p` seen at the joints. Motors that share joints, as in a
-//! differential, need no more: the rotors' inertia seen at the joints, the diagonal `A`, equals the matrix
+//! `theta = m2jp p` are the motor angles `p` seen at the joints. These equations also hold for motors that share joints, as in a
+//! differential: the rotors' inertia seen at the joints, the diagonal `A`, equals the matrix
 //! `m2jp^T A m2jp` at the motors. `slack` is the identity, or subtracts the backlash. `A` acts on the motors instead of
-//! the joints, so `M` is that of the links alone. Spong 1987, "Modeling and control of elastic joint robots".
+//! the joints, so `M` is the mass matrix of the links alone. Spong 1987, "Modeling and control of elastic joint robots".
 //!
 //! The engine integrates by semi-implicit Euler. For a spring of angular frequency `w` that is the symplectic Euler
 //! method, whose energy error stays bounded for `w dt < 2`. A spring with `(w dt)^2 > 0.25` (a stiff cable on a light
@@ -69,7 +69,7 @@ struct Spring {
     half_backlash_rad: f64,
     rotor_kg_m2: f64,
     implicit: bool,
-    /// Rotor velocity at the end of the step if the joint stood still \[rad/s\], and its increase with the joint's
+    /// Rotor velocity at the end of the step for a joint at rest \[rad/s\], and its derivative with respect to the joint's
     /// velocity at that time.
     rotor_next: (f64, f64),
 }
@@ -110,7 +110,7 @@ impl<const N: usize> Rotors<N> {
         }
     }
 
-    /// Puts the rotors where their springs exert `torque_nm` on joints at `q`, moving with them.
+    /// Sets the rotors such that their springs exert `torque_nm` on joints at `q`, and that they move with the joints.
     pub fn set_state(&mut self, q: &Vector<N>, qd: &Vector<N>, torque_nm: &Vector<N>) {
         self.velocity_rad_per_s = *qd;
         self.position_rad = Vector::from_fn(|i, _| match &self.joints[i] {
@@ -169,7 +169,7 @@ impl<const N: usize> Rotors<N> {
         on_links
     }
 
-    /// Completes the step: the joints are now at `q`, `qd`.
+    /// Completes the step with the joint angles `q` and velocities `qd` at its end.
     pub fn advance(&mut self, (q, qd): (&Vector<N>, &Vector<N>), dt_s: f64) {
         for i in 0..N {
             let Some(spring) = &self.joints[i] else {
@@ -197,7 +197,7 @@ impl<const N: usize> Rotors<N> {
         (potential, kinetic)
     }
 
-    /// Whether the joint has a spring.
+    /// Returns whether the joint has a spring.
     pub fn is_elastic(&self, joint: usize) -> bool {
         self.joints[joint].is_some()
     }

@@ -8,11 +8,11 @@
 //! b0 = a k^2   b1 = 2 b0   b2 = b0   a1 = 2 a (k^2 - 1)   a2 = a (1 - sqrt(2) k + k^2)
 //! ```
 //!
-//! It delays by about `sqrt(2) / (2 pi f_c)`, 2.25 ms at 100 Hz.
+//! The filter delays by about `sqrt(2) / (2 pi f_c)`, 2.25 ms at 100 Hz.
 //!
-//! As part of the simulated sensor it shares no code with the zero-phase filter of identification
-//! (`supple_ident::filter`): the same wrong formula in both would falsify a model without showing in a comparison of
-//! model and plant. Both are compared with scipy.
+//! It is part of the simulated sensor and shares no code with the zero-phase filter of identification
+//! (`supple_ident::filter`), so that an error in one of them becomes visible in a comparison of model and plant. Tests compare
+//! both with scipy.
 
 use crate::error::{PlantError, entry};
 use supple_core::nalgebra::Vector3;

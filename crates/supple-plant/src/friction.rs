@@ -119,7 +119,7 @@ impl LuGre {
         self.advance_scaled(deflection_rad, velocity_rad_per_s, load, scale, dt_s)
     }
 
-    /// As [`LuGre::advance`], with dry and viscous friction multiplied by `scale`; stiffness and damping of the bristle
+    /// Does the same as [`LuGre::advance`], with dry and viscous friction multiplied by `scale`; stiffness and damping of the bristle
     /// are unchanged.
     pub fn advance_scaled(
         &self,

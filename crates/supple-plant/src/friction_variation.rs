@@ -1,4 +1,4 @@
-//! How the friction of the joints varies with angle, direction and temperature.
+//! Variation of the joints' friction with angle, direction, load and temperature.
 //!
 //! ```text
 //! varied   = (1 + a sin(n q + phase)) (1 + d sign(v))

@@ -64,10 +64,10 @@ impl Default for Hand {
 }
 
 impl Hand {
-    /// Checks it.
+    /// Checks the values.
     ///
     /// # Errors
-    /// The entry, its value, and what it must be.
+    /// The invalid entry, its value, and the requirement.
     pub fn validate(&self) -> Result<(), (&'static str, f64, String)> {
         for (entry, value, max) in [
             ("hand.stiffness_n_per_m", self.stiffness_n_per_m, 5000.0),
@@ -105,9 +105,9 @@ impl Hand {
         Ok(())
     }
 
-    /// Its motion at a time since it took hold: displacement \[m\] and velocity \[m/s\]; `None` when it is not there.
+    /// Returns displacement \[m\] and velocity \[m/s\] of the hand at a time since it took hold; `None` outside its path.
     fn motion(&self, time_s: f64) -> Option<(Vector3<f64>, Vector3<f64>)> {
-        let (row, share, dt_s) = piece(&self.path, time_s)?;
+        let (row, share, dt_s) = interpolation_interval(&self.path, time_s)?;
         // A cubic through the rows, with the velocity of the chord between the neighbours; at rest at both ends.
         let velocity = |i: usize| match i {
             0 => Vector3::zeros(),
@@ -131,15 +131,15 @@ impl Hand {
         Some((position, rate / dt_s))
     }
 
-    /// Given force at a time since it took hold \[N\].
+    /// Returns the given force at a time since the hand took hold \[N\]; `None` outside its rows.
     fn given_force(&self, time_s: f64) -> Option<Vector3<f64>> {
-        let (row, share, _) = piece(&self.force, time_s)?;
+        let (row, share, _) = interpolation_interval(&self.force, time_s)?;
         Some(xyz(&self.force[row]) * (1.0 - share) + xyz(&self.force[row + 1]) * share)
     }
 }
 
-/// The row before this time, the share of the way to the next, and the time between both \[s\].
-fn piece(rows: &[[f64; 4]], time_s: f64) -> Option<(usize, f64, f64)> {
+/// Returns the row before this time, the fraction of the interval to the next row, and the length of the interval \[s\].
+fn interpolation_interval(rows: &[[f64; 4]], time_s: f64) -> Option<(usize, f64, f64)> {
     let after = rows.iter().position(|row| row[0] > time_s)?;
     let row = after.checked_sub(1)?;
     let dt_s = rows[after][0] - rows[row][0];
@@ -154,9 +154,9 @@ fn xyz(row: &[f64; 4]) -> Vector3<f64> {
 #[derive(Clone, Debug)]
 pub(crate) struct HandState {
     hand: Hand,
-    /// Time at which it took hold \[s\].
+    /// Time at which the hand took hold \[s\].
     since_s: Option<f64>,
-    /// Where the tip was when the path began \[m\].
+    /// Position of the tip when the path began \[m\].
     grip_m: Option<Vector3<f64>>,
 }
 
@@ -169,8 +169,8 @@ impl HandState {
         }
     }
 
-    /// What the controller does from this time on.
-    pub fn see(&mut self, view: ControllerView, time_s: f64) {
+    /// Sets the mode of the controller from this time on, which decides whether the hand holds the tip.
+    pub fn set_controller_view(&mut self, view: ControllerView, time_s: f64) {
         let holds = match self.hand.when {
             Grip::Float => view.active && view.mode == Some(Mode::Float),
             Grip::Active => view.active || self.since_s.is_some(),
@@ -255,12 +255,12 @@ mod tests {
     }
 
     #[test]
-    fn it_holds_only_while_the_arm_floats_and_pulls_no_more_than_it_may() {
+    fn the_hand_holds_only_in_float_and_its_force_stays_within_its_limit() {
         let mut state = HandState::new(hand());
         let (tip_m, rest) = (Vector3::new(0.5, 0.0, 0.3), Vector3::zeros());
-        state.see(seen(true, Mode::GravityHold), 9.0);
+        state.set_controller_view(seen(true, Mode::GravityHold), 9.0);
         assert_eq!(state.force_n(11.0, &tip_m, &rest), rest);
-        state.see(seen(true, Mode::Float), 10.0);
+        state.set_controller_view(seen(true, Mode::Float), 10.0);
         assert_eq!(
             state.force_n(10.5, &tip_m, &rest),
             rest,
@@ -280,7 +280,7 @@ mod tests {
         assert_eq!(force_n.norm().min(50.0), force_n.norm());
         let held_n = state.force_n(13.9, &tip_m, &rest).norm();
         assert!((held_n - 50.0).abs() < 1e-9, "{held_n}");
-        state.see(seen(true, Mode::Fault), 14.0);
+        state.set_controller_view(seen(true, Mode::Fault), 14.0);
         assert_eq!(state.force_n(14.0, &tip_m, &rest), rest);
     }
 
@@ -292,8 +292,8 @@ mod tests {
             ..Hand::default()
         });
         let rest = Vector3::zeros();
-        state.see(seen(true, Mode::Track), 5.0);
-        state.see(seen(false, Mode::Idle), 5.5);
+        state.set_controller_view(seen(true, Mode::Track), 5.0);
+        state.set_controller_view(seen(false, Mode::Idle), 5.5);
         assert_eq!(
             state.force_n(6.0, &rest, &rest),
             Vector3::new(2.0, 0.0, -1.0)
@@ -302,7 +302,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_hand_is_refused_by_its_entry() {
+    fn an_invalid_hand_is_rejected_with_the_name_of_the_entry() {
         assert_eq!(hand().validate(), Ok(()));
         let refused = |change: &dyn Fn(&mut Hand)| {
             let mut wrong = hand();

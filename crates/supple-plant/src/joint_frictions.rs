@@ -35,7 +35,7 @@ impl<const N: usize> JointFrictions<N> {
         }
     }
 
-    /// The arm has another payload or another gravity.
+    /// Updates the loads for an arm with another payload or another gravity.
     pub fn set_arm(&mut self, arm: &Arm<N>) {
         if let Some(load) = &mut self.load {
             *load = Load::new(arm);

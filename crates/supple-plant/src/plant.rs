@@ -109,8 +109,8 @@ impl<const N: usize> Plant<N> {
         Ok(plant)
     }
 
-    /// Advances one control cycle. `torque_nm` is the joint torque commanded in it, positive along positive motion;
-    /// it acts after the actuators' delay. A non-finite command is ignored.
+    /// Advances the simulation by one control cycle. `torque_nm` is the joint torque commanded in this cycle, positive along
+    /// positive motion; it acts after the actuators' delay. A non-finite command is ignored.
     pub fn cycle(&mut self, torque_nm: &Vector<N>) -> Measurement<N> {
         let applied = self.actuators.command(torque_nm);
         let start_s = self.measurement.cycle as f64 * self.config.cycle_s + self.late_s;
@@ -134,7 +134,7 @@ impl<const N: usize> Plant<N> {
         self.measurement
     }
 
-    /// Step of the physics in this cycle \[s\], which ends when the next one starts.
+    /// Returns the physics step of this cycle \[s\]; the cycle ends when the next one starts, which jitters.
     fn jittered_step_s(&mut self) -> f64 {
         let (cycle_s, jitter) = (self.config.cycle_s, self.config.cycle_jitter);
         if jitter == 0.0 {
@@ -146,10 +146,10 @@ impl<const N: usize> Plant<N> {
         lasts_s / self.steps_per_cycle as f64
     }
 
-    /// Passes what the controller does in the next cycle to a hand that guides the arm.
-    pub fn see_controller(&mut self, view: ControllerView) {
+    /// Passes the controller's mode in the next cycle to the hand that guides the arm, if any.
+    pub fn set_controller_view(&mut self, view: ControllerView) {
         if let Some(hand) = &mut self.hand {
-            hand.see(view, self.truth.time_s);
+            hand.set_controller_view(view, self.truth.time_s);
         }
     }
 
@@ -210,7 +210,7 @@ impl<const N: usize> Plant<N> {
         let Some(rotors) = &self.rotors else {
             return energy_j;
         };
-        // That of the arm has its rotors at the speed of the joints.
+        // `energy_j` assumes that the rotors turn at the speed of the joints.
         let armature = self.config.arm.armature();
         let moved = (0..N).filter(|i| rotors.is_elastic(*i));
         let at_joints: f64 = moved.map(|i| 0.5 * armature[i] * qd[i] * qd[i]).sum();
@@ -289,7 +289,7 @@ impl<const N: usize> Plant<N> {
         self.check_start_penetration()
     }
 
-    /// Rejects a tip that starts deep inside an object: contact would eject it.
+    /// Rejects a tip that starts deep inside an object, because the contact force would eject it.
     fn check_start_penetration(&self) -> Result<(), PlantError> {
         match self.world.deepest(&self.tip_motion()) {
             Some((object, depth_m)) if depth_m > MAX_START_DEPTH_M => {

@@ -8,7 +8,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-const EVERY_NS: u64 = 1_000_000;
+const INTERVAL_NS: u64 = 1_000_000;
 
 /// The file cannot be written.
 #[derive(Debug, thiserror::Error)]
@@ -20,7 +20,7 @@ pub struct TraceError {
     pub source: std::io::Error,
 }
 
-/// Data of a line that the plant does not have.
+/// Data of a line that do not come from the plant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample<const N: usize> {
     /// Time \[ns\].
@@ -88,7 +88,7 @@ impl TraceFile {
             return;
         }
         self.active = active;
-        self.next_ns = time_ns + EVERY_NS;
+        self.next_ns = time_ns + INTERVAL_NS;
         let torques = sample.torque_nm.iter().map(|t| format!(",{t:.6}"));
         let force = plant.take_max_force_n();
         let truth = plant.truth();

@@ -1,14 +1,14 @@
 //! Seeded random numbers for searches, emulators, injected faults, tests and benchmarks.
 //!
-//! The same seed gives bit-identical numbers on every machine and in every build. Not for secrets, and not of the
-//! quality that the simulated plant's noise needs: that has a generator of its own.
+//! The same seed gives bit-identical numbers on every machine and in every build. The numbers are unsuitable for secrets, and for
+//! the noise of the simulated plant, which has its own generator.
 #![no_std]
 #![forbid(unsafe_code)]
 
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-/// A generator.
+/// A random-number generator.
 #[derive(Clone, Debug)]
 pub struct Random(SplitMix64);
 
@@ -18,27 +18,27 @@ impl Random {
         Random(SplitMix64::seed_from_u64(seed))
     }
 
-    /// 64 random bits.
+    /// Returns 64 random bits.
     pub fn bits(&mut self) -> u64 {
         self.0.next_u64()
     }
 
-    /// A number below `end`; 0 if `end` is 0.
+    /// Returns a number below `end`; 0 if `end` is 0.
     pub fn below(&mut self, end: u64) -> u64 {
         self.bits() % end.max(1)
     }
 
-    /// An index into `length` items; 0 if there are none.
+    /// Returns an index into `length` items; 0 if there are no items.
     pub fn index(&mut self, length: usize) -> usize {
         self.below(length as u64) as usize
     }
 
-    /// Uniform in \[0, 1).
+    /// Returns a uniformly distributed number in \[0, 1).
     pub fn uniform(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// Uniform in \[-1, 1).
+    /// Returns a uniformly distributed number in \[-1, 1).
     pub fn signed(&mut self) -> f64 {
         2.0 * self.uniform() - 1.0
     }

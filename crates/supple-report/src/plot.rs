@@ -74,7 +74,7 @@ struct Content {
 /// [`Failure`].
 pub fn run(args: &PlotArgs) -> Result<(), Failure> {
     let reader = Reader::open(&args.file)?;
-    let joints = &reader.about().joints;
+    let joints = &reader.metadata().joints;
     let content = with_dof!(joints.len(), N => read::<N>(&reader))??;
     let figures = figures(&content, joints)?;
     let names: Vec<String> = figures
@@ -93,7 +93,7 @@ pub fn run(args: &PlotArgs) -> Result<(), Failure> {
     let summary = Summary {
         log: &args.file,
         arm: reader.description()?.name().to_owned(),
-        experiment: reader.about().experiment.clone(),
+        experiment: reader.metadata().experiment.clone(),
         duration_s: content.duration_s,
         cycles: content.cycles,
         rms_error_m: (tracked > 0).then(|| 1e-3 * (squares / tracked as f64).sqrt()),
@@ -119,7 +119,7 @@ pub fn run(args: &PlotArgs) -> Result<(), Failure> {
 }
 
 fn read<const N: usize>(reader: &Reader) -> Result<Content, Failure> {
-    let start_ns = reader.about().start_ns;
+    let start_ns = reader.metadata().start_ns;
     let seconds = |time_ns: u64| time_ns.saturating_sub(start_ns) as f64 * 1e-9;
     let mut content = Content {
         torques: vec![Default::default(); N],

@@ -4,7 +4,7 @@ use crate::units::{LEFT_OUT, figures, mm, newton_seconds, newtons, percent, plai
 use comfy_table::{ContentArrangement, Table, presets};
 use supple_experiment::metrics::median;
 use supple_experiment::summary::{ContactStatistics, ProbingSummary, Summary, TrackingError};
-use supple_experiment::{JointTorque, Realistic};
+use supple_experiment::{JointTorque, RealisticRuns};
 
 /// Formats the summary, one line per quantity.
 pub fn table(summary: &Summary) -> String {
@@ -193,7 +193,7 @@ pub(crate) fn plants(summary: &Summary) -> (&'static str, &'static str) {
 }
 
 /// The plant with all effects of a real arm, first: the other rows leave these out.
-fn realistic(found: &Realistic, imperfect: &str) -> Vec<Line> {
+fn realistic(found: &RealisticRuns, imperfect: &str) -> Vec<Line> {
     let median_and_worst =
         |errors: &[f64]| millimetres(&[median(errors).unwrap_or(f64::NAN), worst(errors)]);
     let mut faults = match found.ended.len() {

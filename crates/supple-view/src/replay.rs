@@ -3,7 +3,7 @@
 use crate::error::ViewError;
 use crate::snapshot::{CycleExtras, Snapshot, SnapshotBuilder};
 use std::path::Path;
-use supple_log::{CycleTiming, LogError, Reader, Timed};
+use supple_log::{CycleTiming, LogError, Reader, TimedMessage};
 use supple_model::{Description, with_dof};
 
 /// Most snapshots of a log; a longer one has fewer snapshots a second.
@@ -36,7 +36,7 @@ pub fn read(file: &Path) -> Result<Replay, ViewError> {
     let read = with_dof!(description.dof(), N => snapshots::<N>(&reader))?;
     let (snapshots, interval_s, incomplete) = read?;
     Ok(Replay {
-        experiment: reader.about().experiment.clone(),
+        experiment: reader.metadata().experiment.clone(),
         description,
         snapshots,
         interval_s,
@@ -46,7 +46,7 @@ pub fn read(file: &Path) -> Result<Replay, ViewError> {
 
 fn snapshots<const N: usize>(reader: &Reader) -> Result<(Vec<Snapshot>, f64, bool), LogError> {
     let mut timings = reader.timings()?;
-    let mut timing: Option<Timed<CycleTiming>> = None;
+    let mut timing: Option<TimedMessage<CycleTiming>> = None;
     let (mut snapshots, mut interval_s) = (Vec::new(), MIN_INTERVAL_S);
     let mut builder = SnapshotBuilder::<N>::default();
     let (mut start_ns, mut next_s) = (None, 0.0);

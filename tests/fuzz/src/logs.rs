@@ -41,7 +41,7 @@ fn read(path: &Path) {
             let _ = record.value.input();
         }
     }
-    let _ = reader.truths::<3>().map(Iterator::count);
+    let _ = reader.plant_truths::<3>().map(Iterator::count);
 }
 
 /// Opcode and length before every record of a file.

@@ -17,7 +17,7 @@ use supple_core::dynamics::tip_pose;
 use supple_core::math::Vector3;
 use supple_core::trajectory::{Arc, Fourier, Line, Probe, Quadrant, Sinusoid, Trajectory};
 use supple_core::{Output, State, Vector, step};
-use supple_ident::SeriesLists;
+use supple_ident::FourierCoefficients;
 use supple_ipc::message::{
     ArmState, CycleTiming, OperatorReply, OperatorRequest, Outcome, Telemetry, Text, TorqueCommand,
 };
@@ -262,7 +262,7 @@ fn tables() -> Vec<Seed> {
         let t = f64::from(k) * 0.01;
         table += &format!("{t},{},{},{},1.5,-2,{t}\n", 0.1 * t.sin(), t, -t);
     }
-    let series = SeriesLists::from(&Fourier::<3>::at_rest(Vector::repeat(0.2), 0.5));
+    let series = FourierCoefficients::from(&Fourier::<3>::at_rest(Vector::repeat(0.2), 0.5));
     let series = serde_json::to_string(&series).expect("plain data");
     vec![text("table", &table), text("series", &series)]
 }

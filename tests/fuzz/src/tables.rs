@@ -2,7 +2,7 @@
 
 use crate::bytes::with_file;
 use supple_core::trajectory::Fourier;
-use supple_ident::{SeriesLists, read_csv};
+use supple_ident::{FourierCoefficients, read_csv};
 
 /// Input that begins with a brace is a JSON motion of three joints; other input is a table for three joints.
 pub fn csv(data: &[u8]) {
@@ -21,11 +21,11 @@ pub fn csv(data: &[u8]) {
 }
 
 fn series(data: &[u8]) {
-    let Ok(lists) = serde_json::from_slice::<SeriesLists>(data) else {
+    let Ok(lists) = serde_json::from_slice::<FourierCoefficients>(data) else {
         return;
     };
     if let Ok(series) = lists.fourier::<3>() {
-        assert_eq!(SeriesLists::from(&series), lists);
+        assert_eq!(FourierCoefficients::from(&series), lists);
         if Fourier::validate(&series).is_ok() {
             let _ = series.at(0.5 * series.duration_s);
         }

@@ -7,8 +7,8 @@ use clap::builder::RangedU64ValueParser;
 use clap::{Args, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use supple_experiment::procedure::StepName;
-use supple_ident::design::MAX_CANDIDATES;
-use supple_ident::paper::MIN_SAMPLES;
+use supple_ident::excitation_design::MAX_CANDIDATES;
+use supple_ident::paper_estimator::MIN_SAMPLES;
 use supple_ident::{FrictionChoice, FrictionColumns, LoadTorque, Method};
 use supple_plant::Injection;
 

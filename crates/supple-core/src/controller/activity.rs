@@ -16,14 +16,14 @@ pub(super) enum Activity<const N: usize> {
         duration_s: f64,
     },
     Track(Trajectory),
-    /// Follows set-points; the segment is on the clock of the activity.
+    /// Follows set-points; times of the segment count from the start of the activity.
     SetPoints(Segment),
     Excite(Fourier<N>),
     Breakaway {
         ramp: Breakaway,
         /// Set-points of the other joints; for the ramped joint the angle from which its motion is measured.
         from_rad: Vector<N>,
-        /// Torque of the ramped joint's position loop and friction at the entry, which the ramp is added to.
+        /// Torque of the ramped joint's position loop and friction when the mode was entered; the ramp is added to it \[N m\].
         held_nm: f64,
     },
     Float,
@@ -35,9 +35,9 @@ pub(super) enum Activity<const N: usize> {
     TrackPose {
         trajectory: Trajectory,
         rotation: Rotation,
-        /// Orientation of the tip at the entry.
+        /// Orientation of the tip when the mode was entered.
         from_base_from_tip: Matrix3<f64>,
-        /// Joint angles at the entry.
+        /// Joint angles when the mode was entered \[rad\].
         posture_rad: Vector<N>,
     },
     Fault(SafeAction),
@@ -60,7 +60,7 @@ impl<const N: usize> Activity<N> {
         }
     }
 
-    /// Whether this activity has a stiff position loop for every joint, held ones included.
+    /// Returns whether this activity has a stiff position loop for every joint, held ones included.
     pub fn has_joint_loops(&self) -> bool {
         matches!(
             self,
@@ -68,12 +68,12 @@ impl<const N: usize> Activity<N> {
         )
     }
 
-    /// Whether joints follow a reference of their own, by stiff loops or compliant springs.
+    /// Returns whether joints follow a reference of their own, by stiff loops or compliant springs.
     pub fn has_joint_reference(&self) -> bool {
         self.has_joint_loops() || matches!(self, Activity::JointImpedance { .. })
     }
 
-    /// Whether the activity commands no torque at all.
+    /// Returns whether the activity commands no torque at all.
     pub fn is_torque_off(&self) -> bool {
         matches!(self, Activity::Idle | Activity::Fault(SafeAction::Brake))
     }

@@ -55,8 +55,8 @@ impl<const N: usize> State<N> {
         controller.move_gains(&self.terms.mass_matrix)
     }
 
-    /// Set-points with which a gravity hold that keeps the pose would go on from loops, `None` without loops or such a
-    /// hold. The joint of a ramp keeps the torque that it had before.
+    /// Returns the set-points from which a gravity hold that keeps the pose continues after position loops; `None` without
+    /// loops, or if gravity hold does not keep the pose. The joint of a ramp keeps the torque from before the ramp.
     pub(super) fn pose_to_hold_rad(&self, controller: &Controller<N>) -> Option<Vector<N>> {
         let config = controller.config();
         if !config.hold_pose {
@@ -70,8 +70,8 @@ impl<const N: usize> State<N> {
         Some(setpoint_rad)
     }
 
-    /// Torque terms of the activity, without those that every activity has. Inlined, so that the terms are written where
-    /// the cycle's record has them.
+    /// Returns the torque terms of the activity, without those common to all activities. Inlined, so that the terms are written
+    /// directly into the cycle's record.
     #[inline(always)]
     pub(super) fn activity_torques(
         &self,
@@ -113,7 +113,7 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Friction of an arm that contact blocks, or has just blocked.
+    /// Friction feed-forward that is frozen while contact blocks the arm, and shortly after.
     pub(super) fn held_friction(&self, config: &Config<N>) -> Option<HeldFriction<'_, N>> {
         (config.latch.hold_friction && self.latch.held() > 0.0).then(|| HeldFriction {
             velocity_rad_per_s: &self.contact_velocity_rad_per_s,
@@ -122,7 +122,7 @@ impl<const N: usize> State<N> {
         })
     }
 
-    /// Gravity hold with joint damping, the safe action, or nothing.
+    /// Returns the torques of gravity hold with joint damping, of the safe action, or zero without torque.
     pub(super) fn safe_torques(&self, controller: &Controller<N>) -> Torques<N> {
         let config = controller.config();
         if self.activity.is_torque_off() {
@@ -255,8 +255,8 @@ impl<const N: usize> State<N> {
         torques
     }
 
-    /// Start of a breakaway ramp. What position loops or an earlier ramp have held until now goes on: their set-points for
-    /// the other joints, their torque for the ramped one, so that gravity which the model lacks does not move the arm.
+    /// Returns the activity of a breakaway ramp. It continues from position loops or an earlier ramp: the other joints keep
+    /// their set-points, the ramped joint keeps its torque, so that gravity which the model lacks does not move the arm.
     pub(super) fn breakaway_from(
         &self,
         controller: &Controller<N>,
@@ -274,7 +274,7 @@ impl<const N: usize> State<N> {
                 ..
             } = &self.activity
             {
-                // The set-point from which the loop gives the torque of the ramp.
+                // The set-point at which the loop gives the torque of the earlier ramp.
                 let ramped = earlier.joint;
                 let torque_nm = held_nm + earlier.rate_nm_per_s * self.activity_s(config);
                 from_rad[ramped] =
@@ -309,7 +309,7 @@ impl<const N: usize> State<N> {
             return Ok(());
         }
         self.enter(Activity::GravityHold);
-        // A smaller torque is not what moves the joint: its gravity torque is wrong, or somebody pushes it.
+        // A smaller torque cannot have moved the joint: the modelled gravity is wrong, or somebody pushes the joint.
         let limit_nm = MOVING_SHARE_OF_BREAKAWAY * self.friction[joint].dry_size_nm(0.0);
         let value_nm = abs(torque_nm);
         let is_against = moved_rad * torque_nm < 0.0 && abs(moved_rad) >= ramp.stop_rad;
@@ -323,8 +323,8 @@ impl<const N: usize> State<N> {
         Ok(())
     }
 
-    /// Adds the terms of every activity whose torques follow a fresh state and act on the arm: held-joint loops, soft
-    /// stops and the workspace margin. A fault has none of them.
+    /// Adds the terms common to all activities with torque, if the state is fresh and the drives are active: held-joint loops,
+    /// soft stops and the workspace margin. In a fault none of them acts.
     #[inline(always)]
     pub(super) fn add_joint_loops_and_stops(
         &self,
@@ -384,7 +384,7 @@ impl<const N: usize> State<N> {
         if self.fault.is_some() {
             return;
         }
-        if let Some(zeros) = self.handover.ended() {
+        if let Some(zeros) = self.handover.zeros_if_finished() {
             torques.handover = *zeros;
             return;
         }

@@ -7,8 +7,8 @@ use crate::config::Limits;
 use crate::law::impedance::Torques;
 use crate::math::{Vector, Vector3, abs, all_finite, sqrt};
 
-/// Share of the speed limits that applies in float and joint impedance: little or nothing but the model resists a
-/// fall there, and a hand guides slowly.
+/// Fraction of the speed limits that applies in float and joint impedance. In these modes little resists a fall if the model is
+/// wrong, and a hand guides the arm slowly.
 pub(super) const COMPLIANT_SPEED_SHARE: f64 = 0.5;
 
 /// Fraction of a speed limit above which a joint or the tip counts as moving.
@@ -115,7 +115,7 @@ pub(super) fn joint_tracking<const N: usize>(
     Ok(())
 }
 
-/// The sum of all terms; an error if a term or the sum is not finite.
+/// Returns the sum of all terms; a fault if a term or the sum is not finite.
 #[inline(always)]
 pub(super) fn total<const N: usize>(torques: &Torques<N>) -> Result<Vector<N>, Fault> {
     let total = torques.total();
@@ -132,11 +132,11 @@ pub(super) fn total<const N: usize>(torques: &Torques<N>) -> Result<Vector<N>, F
 /// depth into this range, and only motion towards the stop is damped, so that the torque is continuous and never
 /// pulls towards the stop. Beyond the hard stop the spring torque stays constant.
 pub(super) struct SoftStop<const N: usize> {
-    /// Its sign is the direction away from the stop.
+    /// Depth of each joint in its soft zone, -1 to 1; the sign is the direction away from the stop.
     depth: Vector<N>,
-    /// Torque of the springs.
+    /// Torque of the springs \[N m\].
     pub spring_nm: Vector<N>,
-    /// Damping of motion towards the stop.
+    /// Damping of motion towards the stop \[N m s/rad\].
     pub damping_nm_s_per_rad: Vector<N>,
 }
 

@@ -1,10 +1,10 @@
-//! Damping at the joints that the delay of the loop allows in a pose: of the move mode, and of the soft stops.
+//! Joint damping that the loop's delay allows in a pose, for the move mode and the soft stops.
 //!
-//! With a delayed velocity, damping `D` of joints with mass matrix `H` is stable while the greatest eigenvalue of
-//! `H^-1 D` times the delay stays below `pi/2`. A joint whose axis the arm lies along has little inertia: there its
-//! gains are reduced, stiffness and damping by the same share, so that its loop keeps its shape in time scaled by
-//! that share. The eigenvalues of `S D^1/2 H^-1 D^1/2`, with the diagonal `S` of the shares, are at most its
-//! greatest row sum (Gershgorin).
+//! With a delayed velocity, damping `D` of joints with mass matrix `H` is stable while the maximum eigenvalue of
+//! `H^-1 D` times the delay stays below `pi/2`. If the arm is aligned with the axis of a joint, that joint has little inertia.
+//! Its stiffness and damping are then reduced by the same share, so that its loop keeps the same response, slowed by
+//! that share. The eigenvalues of `S D^1/2 H^-1 D^1/2`, with the diagonal matrix `S` of the shares, are at most its
+//! maximum row sum (Gershgorin).
 
 use super::Controller;
 use super::activity::Activity;
@@ -14,12 +14,12 @@ use crate::config::{Config, JointGains, Role};
 use crate::math::linalg::Cholesky;
 use crate::math::{Matrix, Vector, abs, sqrt};
 
-/// Greatest eigenvalue of `H^-1 D` times the delay: three quarters of the stability limit.
+/// Maximum allowed eigenvalue of `H^-1 D` times the delay: three quarters of the stability limit.
 const JOINT_DAMPING_MARGIN: f64 = 0.75 * core::f64::consts::FRAC_PI_2;
 
 impl<const N: usize> Controller<N> {
-    /// Share of each joint's damping \[N m s/rad\] that the delay of the loop allows with this mass matrix \[kg m^2\]:
-    /// above 0, at most 1.
+    /// Returns the fraction of each joint's damping \[N m s/rad\] that the loop's delay allows with this mass matrix
+    /// \[kg m^2\]: above 0, at most 1.
     #[inline(never)]
     pub fn allowed_damping_share(
         &self,
@@ -45,8 +45,8 @@ impl<const N: usize> Controller<N> {
         })
     }
 
-    /// Gains of the move mode with this mass matrix \[kg m^2\]: those of the configuration, less where the delay of the
-    /// loop does not allow them.
+    /// Returns the gains of the move mode with this mass matrix \[kg m^2\]: the configured gains, reduced for joints where the
+    /// loop's delay does not allow them.
     pub fn move_gains(&self, mass_matrix: &Matrix<N, N>) -> JointGains<N> {
         let gains = &self.config.move_gains;
         let share = self.allowed_damping_share(mass_matrix, &gains.damping_nm_s_per_rad);
@@ -58,8 +58,8 @@ impl<const N: usize> Controller<N> {
 }
 
 impl<const N: usize> State<N> {
-    /// Soft stops in this pose: those of the configuration, less where the delay does not allow their damping together
-    /// with that of the joint's own loop. `None` outside all soft zones, the common case.
+    /// Returns the soft stops in this pose: the configured ones, reduced for joints where the delay does not allow their damping
+    /// in addition to the damping of the joint's own loop. `None` if no joint is in a soft zone, the common case.
     #[inline(always)]
     pub(super) fn soft_stops(&self, controller: &Controller<N>) -> Option<SoftStop<N>> {
         let zone_rad = controller.config().limits.soft_zone_rad;
@@ -85,7 +85,7 @@ impl<const N: usize> State<N> {
         stop
     }
 
-    /// Damping of the joints' own loops in this mode and pose.
+    /// Damping of the joints' own loops in this mode and pose \[N m s/rad\].
     fn loop_damping_nm_s_per_rad(&self, controller: &Controller<N>) -> Vector<N> {
         let config: &Config<N> = controller.config();
         if self.holds_pose() || self.activity.has_joint_loops() {

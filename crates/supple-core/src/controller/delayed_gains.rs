@@ -1,4 +1,4 @@
-//! Requested damping that the delay of the loop allows in the pose of the request.
+//! Checks that the loop's delay allows a requested damping in the pose of the request.
 
 use super::Controller;
 use super::checks::DAMPING_MARGIN;
@@ -32,7 +32,7 @@ impl<const N: usize> State<N> {
         )
     }
 
-    /// The same for linear and rotational damping together, each pair of matrices about the base axes.
+    /// Refuses linear and rotational damping matrices about the base axes if the loop's delay does not allow every pair of them.
     pub(super) fn check_pose_damping(
         &self,
         controller: &Controller<N>,
@@ -67,7 +67,7 @@ impl<const N: usize> State<N> {
         Ok(())
     }
 
-    /// The same for damping at the active joints.
+    /// Refuses damping at the active joints that the loop's delay does not allow.
     pub(super) fn check_joint_damping(
         &self,
         controller: &Controller<N>,

@@ -10,7 +10,7 @@
 //! - a joint at twice its speed limit ends the torque;
 //! - in a fault, a joint that still moves after 0.25 s, or that accelerates, ends the torque.
 //!
-//! The guard keeps no latch: its caller ends the torque at the first reason and decides when it may
+//! The guard latches nothing: its caller ends the torque at the first reason and decides when torque may
 //! return (`supple-drive/src/guard.rs`).
 
 use super::words::{JointLabel, NamesJoints};
@@ -29,15 +29,15 @@ const MOVING_SHARE: f64 = 0.25;
 /// Time after a fault within which the arm must come to rest \[s\]: a little more than the
 /// controller's own limit.
 const STOP_TIMEOUT_S: f64 = 0.25;
-/// Settling time of the velocity estimate after a fault; speeds in it count as speeds before the
-/// fault \[s\].
+/// Settling time of the velocity estimate after a fault \[s\]; speeds within this time count as speeds before the
+/// fault.
 const ESTIMATOR_SETTLING_S: f64 = 0.02;
 /// Ratio to the speed before the fault above which a joint counts as accelerating.
 const SPEED_GROWTH_LIMIT: f64 = 1.25;
 /// Time in which a stop or a fallback torque may ramp a joint from full torque to zero \[s\].
 const STOP_TORQUE_S: f64 = 0.005;
 
-/// Why the guard ended the torque.
+/// Reason for which the guard ended the torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum GuardReason {
     /// A joint is far above its speed limit.
@@ -242,7 +242,7 @@ impl<const N: usize> DriveGuard<N> {
         }
     }
 
-    /// Limits a torque and its rate; a torque that is not finite becomes zero. With `stopping`
+    /// Returns the torque with magnitude and rate limited; a torque that is not finite becomes zero. With `stopping`
     /// (fallback or fault) the rate limit is higher.
     pub fn limited_nm(&mut self, torque_nm: &Vector<N>, stopping: bool) -> Vector<N> {
         let rate = if stopping {
@@ -259,7 +259,7 @@ impl<const N: usize> DriveGuard<N> {
         limited.torque_nm
     }
 
-    /// The motors are idle: resets the rate limiter to `torque_nm`, limited. Returns the limited
+    /// Resets the rate limiter to the limited `torque_nm`, while the motors are idle. Returns the limited
     /// torque; zero if it is not finite.
     pub fn reset_rate_limit(&mut self, torque_nm: &Vector<N>) -> Vector<N> {
         let (allowed_nm, _) = limit_torque(&self.limits, &self.groups, torque_nm);

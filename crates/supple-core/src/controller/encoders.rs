@@ -1,38 +1,39 @@
-//! Where the encoders are: on the motors. One that sticks shows wrong angles of all joints that its motor drives.
+//! Coupling between encoders and joints. The encoders are on the motors: a stuck encoder gives wrong angles of all joints that
+//! its motor drives.
 
 use crate::config::Config;
 use crate::math::{Matrix, Vector, abs};
 
-/// Dry friction that may hold a motor at rest, as a multiple of what the model knows.
+/// Dry friction that may hold a motor at rest, as a multiple of the modelled dry friction.
 const DRY_FRICTION_RATIO: f64 = 1.5;
 /// Error of the model at rest, as a fraction of a motor's torque limit.
 const MODEL_ERROR_SHARE: f64 = 0.02;
 
-/// The angles that the encoders see, each in radians of the joint that turns its motor most.
+/// Angles of the encoders, each in radians of the joint that turns its motor most.
 #[derive(Clone, Copy, Debug)]
 pub struct Encoders<const N: usize> {
     from_joint: Matrix<N, N>,
-    /// A motor drives more than one joint.
+    /// Whether a motor drives more than one joint.
     coupled: bool,
     /// The joint that turns the motor of each encoder most.
     joint: [usize; N],
     /// Whether a motor (second index) drives a joint.
     drives: [[bool; N]; N],
-    /// The angles of the joints from those of the encoders.
+    /// Joint angles from encoder angles.
     to_joint: Matrix<N, N>,
 }
 
-/// What the step of an encoder does to the estimates.
+/// Effect of one resolution step of an encoder on the estimates.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct EncoderStep {
-    /// Change of the observed torque over the step, for an inertia of 1 kg m^2 \[N m/(rad kg m^2)\].
+    /// Change of the observed torque per step angle, for an inertia of 1 kg m^2 \[N m/(rad kg m^2)\].
     pub observed_per_s2: f64,
-    /// Time after the step from which the observed torque no longer shows it \[s\].
+    /// Time for which the step affects the observed torque \[s\].
     pub lasts_s: f64,
 }
 
 impl EncoderStep {
-    /// For the bandwidths of the velocity estimate and of the observer.
+    /// Computes the effect from the bandwidths of the velocity estimate and of the observer.
     pub fn new(estimator_rad_per_s: f64, observer_rad_per_s: f64) -> EncoderStep {
         // Peak of the estimated velocity over the step, at `1 / omega` after it.
         let velocity_per_s = estimator_rad_per_s / core::f64::consts::E;
@@ -53,7 +54,7 @@ impl<const N: usize> Encoders<N> {
             driven.count() > 1
         });
         if !coupled {
-            // Each joint has a motor of its own, in whatever order.
+            // Each joint has its own motor; the order of the motors does not matter.
             return Encoders {
                 from_joint: Matrix::identity(),
                 coupled,
@@ -77,8 +78,8 @@ impl<const N: usize> Encoders<N> {
         }
     }
 
-    /// Angles or speeds of the encoders from those of the joints.
-    pub(super) fn of_joints(&self, joints: &Vector<N>) -> Vector<N> {
+    /// Returns angles or speeds of the encoders from those of the joints.
+    pub(super) fn from_joints(&self, joints: &Vector<N>) -> Vector<N> {
         if self.coupled {
             self.from_joint * joints
         } else {
@@ -86,24 +87,24 @@ impl<const N: usize> Encoders<N> {
         }
     }
 
-    /// The same of one encoder.
-    pub(super) fn of_joints_at(&self, encoder: usize, joints: &Vector<N>) -> f64 {
+    /// Returns the angle or speed of one encoder from those of the joints.
+    pub(super) fn from_joints_at(&self, encoder: usize, joints: &Vector<N>) -> f64 {
         (self.from_joint.row(encoder) * joints)[0]
     }
 
-    /// Torque on the motor of an encoder, which does the same work on its angle as the torques on the joints on theirs.
+    /// Returns the torque on the motor of an encoder that is equivalent to the joint torques (equal virtual work) \[N m\].
     pub(super) fn torque_at(&self, encoder: usize, joints_nm: &Vector<N>) -> f64 {
         self.to_joint.column(encoder).dot(joints_nm)
     }
 
-    /// Inertia that a motor turns with its encoder, for the mass matrix of the joints \[kg m^2\].
+    /// Returns the inertia at the motor of an encoder for the mass matrix of the joints \[kg m^2\].
     pub(super) fn inertia_at(&self, encoder: usize, mass_matrix: &Matrix<N, N>) -> f64 {
         let joints = self.to_joint.column(encoder);
         joints.dot(&(mass_matrix * joints))
     }
 
-    /// External torque on the motor of each encoder, as of [`Encoders::torque_at`], above which dry friction does not hold it
-    /// \[N m\]. It includes an error of the model.
+    /// Returns the external torque on the motor of each encoder (see [`Encoders::torque_at`]) above which dry friction does not
+    /// hold the motor \[N m\], with a margin for errors of the model.
     pub(super) fn stiction_limit_nm(
         &self,
         config: &Config<N>,

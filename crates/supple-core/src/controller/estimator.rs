@@ -37,8 +37,8 @@ impl EstimatorGains {
         }
     }
 
-    /// The accelerations by which an estimate changes that is this much behind the positions after its update \[rad\], as after a
-    /// stroke.
+    /// Returns the acceleration with which the velocity estimate changes while the position estimate lags the measured position
+    /// by `behind_rad` \[rad\] after its update, for example after an impact.
     pub(super) fn acceleration_rad_per_s2<const N: usize>(
         &self,
         behind_rad: &Vector<N>,
@@ -82,7 +82,7 @@ impl<const N: usize> Estimator<N> {
         }
     }
 
-    /// The same, of positions that are all measured.
+    /// Updates the estimate with positions that are all measured.
     pub(super) fn update_all(&mut self, measured_rad: &Vector<N>, gains: &EstimatorGains) {
         for i in 0..N {
             self.correct(i, measured_rad[i], gains);
@@ -99,7 +99,7 @@ impl<const N: usize> Estimator<N> {
         let at_rest = abs(velocity) < MIN_SPEED_RAD_PER_S;
         self.position_rad[i] = position;
         self.velocity_rad_per_s[i] = if at_rest { 0.0 } else { velocity };
-        // Infinite or no number, if either is.
+        // The sum is zero exactly if both are finite.
         if !(position * 0.0 + velocity * 0.0 == 0.0) {
             (self.position_rad[i], self.velocity_rad_per_s[i]) = (measured_rad, 0.0);
         }

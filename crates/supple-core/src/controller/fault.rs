@@ -1,4 +1,4 @@
-//! Faults: why the controller stopped, with the measured value and the violated limit.
+//! Faults: the reason for which the controller stopped, with the measured value and the violated limit.
 
 use super::words::{JointLabel, NamesJoints};
 use crate::record::Text;
@@ -21,7 +21,7 @@ pub enum Fault {
     EncoderJump {
         /// Joint index.
         joint: usize,
-        /// Distance from the angle expected \[rad\].
+        /// Distance from the expected angle \[rad\].
         value_rad: f64,
         /// Maximum plausible distance \[rad\].
         limit_rad: f64,
@@ -110,7 +110,7 @@ pub enum Fault {
     EncoderStuck {
         /// Joint index.
         joint: usize,
-        /// Travel of its reference meanwhile, or at its last speed \[rad\].
+        /// Travel of the joint's reference meanwhile, or of the joint at its last speed \[rad\].
         value_rad: f64,
         /// Limit \[rad\].
         limit_rad: f64,

@@ -13,7 +13,7 @@ pub(super) struct GainRamp<G> {
 
 /// Gains between which a ramp interpolates.
 pub(super) trait Interpolate: Copy {
-    /// `self` at 0, `to` at 1.
+    /// Returns the gains at the fraction `x` from `self` (0) to `to` (1).
     fn between(&self, to: &Self, x: f64) -> Self;
 }
 

@@ -1,53 +1,53 @@
-//! Bumpless change of activity: the torque goes on from where it was, and the difference is blended out.
+//! Bumpless change of activity: the torque continues from its last value, and the difference to the new law is blended out.
 //!
-//! A change blends out the torque before it less that of the new law, within `handover_s`, with the shape of a
-//! minimum-jerk motion. What then still acts of earlier changes also decays exponentially in every cycle, so that requests
-//! that follow one another faster than that cannot keep a torque alive. A mode that is entered again within [`REPEATED_CYCLES`] has
-//! no difference of its own: it would be the law's own reaction of the last cycles, and holding that back delays stiff
-//! loops.
+//! At a change, the handover adds the difference between the last torque and the torque of the new law, and blends it out within
+//! `handover_s` along a minimum-jerk curve. Remainders of earlier changes also decay exponentially in every cycle, so that
+//! requests in quick succession cannot sustain a torque. If the same mode is entered again within [`REPEATED_CYCLES`], the
+//! handover adds no difference: it would be the law's own reaction of the last cycles, and delaying that reaction destabilises
+//! stiff loops.
 //!
-//! At a reset only the soft stops, which a fault leaves out, come back within `handover_s`. The torque of the safe action is
-//! `-p / t_s`: blended out slowly it would push an arm that it has stopped. It decays with `t_s` or faster, so that its
-//! impulse is at most the momentum that is left.
+//! At a reset only the torque of the soft stops, which a fault switches off, returns within `handover_s`. The torque of the safe
+//! action is `-p / t_s`: blended out slowly it would push an arm that it has already stopped. It decays with `t_s` or faster, so
+//! that its impulse is at most the remaining momentum.
 
 use crate::law::torques::Torques;
 use crate::math::{Vector, smooth_step};
 
-/// Cycles within which the same mode is entered again without a difference.
+/// Cycles within which entering the same mode again adds no difference.
 pub(super) const REPEATED_CYCLES: u64 = 10;
 
-/// From what an activity takes over.
+/// Source of the torque from which a new activity takes over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum HandoverFrom {
-    /// From the torque of the last cycle.
+    /// Torque of the last cycle.
     LastTorque,
-    /// From the same mode, which has hardly begun.
+    /// The same mode, which has just begun.
     SameMode,
-    /// From the safe action of a fault.
+    /// Safe action of a fault.
     Stopping,
 }
 
-/// The remainders of torques before changes of activity.
+/// Torque remainders of earlier activities, which are blended out.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Handover<const N: usize> {
-    /// A change in this cycle, whose difference is not known yet.
+    /// A change in this cycle whose torque difference is not computed yet.
     pending: Option<HandoverFrom>,
-    /// Something acts.
+    /// Whether a remainder acts.
     active: bool,
     /// Difference at the last change \[N m\].
     difference_nm: Vector<N>,
-    /// What still acts of earlier changes \[N m\].
+    /// Remainder of earlier changes \[N m\].
     earlier_nm: Vector<N>,
-    /// What acted in the last cycle \[N m\].
+    /// Total remainder in the last cycle \[N m\].
     last_nm: Vector<N>,
-    /// Part of earlier remainders that ends in a cycle.
+    /// Fraction by which earlier remainders decay in a cycle.
     decay: f64,
-    /// The last change was in the last cycle.
+    /// Whether the last change was in the last cycle.
     just_begun: bool,
 }
 
 impl<const N: usize> Handover<N> {
-    /// Nothing to blend out.
+    /// Returns a handover without remainder.
     pub fn none() -> Handover<N> {
         Handover {
             pending: None,
@@ -60,20 +60,21 @@ impl<const N: usize> Handover<N> {
         }
     }
 
-    /// What acts if nothing is to be blended out: zeros.
-    pub fn ended(&self) -> Option<&Vector<N>> {
+    /// Returns the remainder, a vector of zeros, if nothing is being blended out; otherwise `None`.
+    pub fn zeros_if_finished(&self) -> Option<&Vector<N>> {
         (!self.active).then_some(&self.difference_nm)
     }
 
-    /// Notes a change of activity.
+    /// Registers a change of activity; [`Handover::blend`] of the same cycle computes its difference.
     pub fn begin(&mut self, from: HandoverFrom) {
         self.pending = Some(from);
         self.active = true;
         self.earlier_nm = self.last_nm;
     }
 
-    /// The remainder in this cycle \[N m\]. `share` is the time since the change over `handover_s`, `cycle_share` the period over
-    /// it, `stop_share` the period over `t_s`; `torque_nm` acted in the last cycle, `torques` are those of the new law.
+    /// Returns the remainder in this cycle \[N m\]. `torque_nm` is the torque of the last cycle, `torques` are the terms of the
+    /// new law, `share` is the time since the change over `handover_s`, `cycle_share` the period over `handover_s`, and
+    /// `stop_share` the period over `t_s`.
     #[inline(always)]
     pub fn blend(
         &mut self,
@@ -84,12 +85,12 @@ impl<const N: usize> Handover<N> {
         stop_share: f64,
     ) -> Vector<N> {
         let begins = self.pending == Some(HandoverFrom::LastTorque);
-        // The first of several changes makes no jump at all.
+        // The first of several changes causes no jump.
         if !begins || self.just_begun {
             self.earlier_nm *= (1.0 - self.decay).max(0.0);
         }
         self.just_begun = begins;
-        // Until all has ended the decay becomes no slower.
+        // The decay may become faster, but not slower, until all remainders have ended.
         let decay = match self.pending {
             Some(HandoverFrom::Stopping) => cycle_share.max(stop_share),
             _ => cycle_share,
@@ -108,7 +109,7 @@ impl<const N: usize> Handover<N> {
         }
         if share >= 1.0 {
             *self = Handover {
-                // Zeros with the sign that blending leads to.
+                // Zeros with the sign that blending gives.
                 difference_nm: self.difference_nm * 0.0,
                 ..Handover::none()
             };

@@ -1,7 +1,7 @@
 //! Contact latch: detects contact at the tip and fades the friction feed-forward.
 //!
-//! A blocked arm keeps pushing with the friction compensation, about `S / r`, which at low
-//! stiffness *is* the contact force. The latch closes when the observed force against the
+//! A blocked arm keeps pushing with the friction compensation, a tip force of about `S / r` (dry friction over lever arm), which
+//! at low stiffness is most of the contact force. The latch closes when the observed force against the
 //! reference's motion exceeds a threshold, fades the feed-forward, and opens when the reference
 //! retreats.
 //!
@@ -17,24 +17,24 @@ use crate::math::{Vector3, sqrt};
 
 /// Minimum reference speed for which a direction is defined \[m/s\].
 const MIN_SPEED_M_PER_S: f64 = 1e-3;
-/// Share of the reference's speed above which the tip follows it.
+/// Fraction of the reference's speed above which the tip counts as following it.
 const FOLLOWING_SHARE: f64 = 0.5;
-/// Time for which the tip must follow the reference until the latch opens \[s\]: less than friction needs
-/// to stop an arm whose feed-forward has begun to fade.
+/// Time for which the tip must follow the reference until the latch opens \[s\]. Friction takes longer to stop an arm whose
+/// feed-forward has begun to fade.
 const FOLLOWING_S: f64 = 0.01;
-/// Time after closing in which the tip must be slowed, if the feed-forward fades earlier than that \[s\].
+/// Minimum time after the latch closes in which a slowed tip confirms the contact, even if the feed-forward fades earlier \[s\].
 const SLOWED_S: f64 = 0.005;
 /// Time over which the force at rest is averaged \[s\].
 const RESTING_S: f64 = 0.1;
 /// Time after a release in which the next contact counts as confirmed \[s\].
 const AGAIN_S: f64 = 0.5;
 
-/// What a cycle shows of contact.
+/// Inputs of the contact latch in one cycle.
 #[derive(Clone, Copy, Debug)]
-pub struct Evidence {
+pub struct LatchInput {
     /// Observed force on the tip, base axes \[N\].
     pub force_n: Vector3<f64>,
-    /// Uncertainty of the joints' friction along the reference's direction \[N\], by which the threshold grows.
+    /// Uncertainty of the joints' friction along the reference's direction, which is added to the threshold \[N\].
     pub friction_uncertainty_n: f64,
     /// Velocity of the tip, base axes \[m/s\].
     pub tip_velocity_m_per_s: Vector3<f64>,
@@ -53,10 +53,10 @@ pub struct Latch {
     confirmed: bool,
     latched_s: f64,
     following_s: f64,
-    /// Since the latch opened by itself.
+    /// Time since the latch opened by itself \[s\].
     since_release_s: f64,
     residual: ResidualScale,
-    /// Mean force at rest, which friction holds \[N\].
+    /// Mean observed force at rest, which static friction holds \[N\].
     resting_force_n: Vector3<f64>,
     /// Fraction of the friction feed-forward that is applied, 0 to 1.
     share: f64,
@@ -66,13 +66,13 @@ pub struct Latch {
 }
 
 impl Latch {
-    /// An open latch, before any motion, whose velocities have the bandwidth `estimator_rad_per_s`.
+    /// Returns an open latch before any motion; `estimator_rad_per_s` is the bandwidth of the velocity estimate.
     pub fn new(config: &ContactLatch, estimator_rad_per_s: f64) -> Self {
         let residual = ResidualScale::new(config.false_alarms_per_hour, estimator_rad_per_s);
         Latch::open(residual, Vector3::zeros())
     }
 
-    /// An open latch before any motion that uses the residuals of this one.
+    /// Returns an open latch before any motion that keeps the residual statistics of this one.
     pub fn restarted(&self) -> Self {
         Latch::open(self.residual, self.resting_force_n)
     }
@@ -96,7 +96,7 @@ impl Latch {
         }
     }
 
-    /// Whether contact is latched.
+    /// Returns whether contact is latched.
     pub fn in_contact(&self) -> bool {
         self.in_contact
     }
@@ -106,13 +106,13 @@ impl Latch {
         self.share
     }
 
-    /// How much of the dry friction feed-forward is that of the moment of contact, 0 to 1: all of it in
-    /// contact, after release less and less.
+    /// Returns the fraction of the dry friction feed-forward that keeps its value at the start of the contact, 0 to 1: one in
+    /// contact, decreasing to zero after release.
     pub fn held(&self) -> f64 {
         self.held
     }
 
-    /// Fraction of the viscous friction feed-forward to apply, 0 to 1: an arm that is blocked has none.
+    /// Fraction of the viscous friction feed-forward to apply, 0 to 1; zero while the arm is blocked.
     pub fn viscous_share(&self, config: &ContactLatch) -> f64 {
         let fades = 1.0 - config.contact_share;
         if fades > 0.0 {
@@ -158,8 +158,8 @@ impl Latch {
         }
     }
 
-    /// Adds the observed force of an arm that is to stand still \[N\]: what changes of it is noise, whatever
-    /// friction hides.
+    /// Adds the observed force of an arm that is expected to be at rest \[N\]. Its changes are noise; its mean is the force that
+    /// static friction holds.
     #[inline]
     pub fn observe_at_rest(
         &mut self,
@@ -175,14 +175,14 @@ impl Latch {
 
     /// Second half of a cycle: compares the observed tip force with the threshold.
     #[inline]
-    pub fn update_contact(&mut self, config: &ContactLatch, evidence: &Evidence, elapsed_s: f64) {
-        self.force_against_n = -evidence.force_n.dot(&self.direction);
+    pub fn update_contact(&mut self, config: &ContactLatch, input: &LatchInput, elapsed_s: f64) {
+        self.force_against_n = -input.force_n.dot(&self.direction);
         let reversing = self.since_reversal_s < config.reversal_s;
-        let configured_n = config.threshold_n + evidence.friction_uncertainty_n;
+        let configured_n = config.threshold_n + input.friction_uncertainty_n;
         let factor = self.residual.factor() * if reversing { 2.0 } else { 1.0 };
         self.threshold_n = configured_n * factor;
         let pushed = self.force_against_n > self.threshold_n;
-        let tip_m_per_s = evidence.tip_velocity_m_per_s.dot(&self.direction);
+        let tip_m_per_s = input.tip_velocity_m_per_s.dot(&self.direction);
         let follows = self.reference_m_per_s > MIN_SPEED_M_PER_S
             && tip_m_per_s >= FOLLOWING_SHARE * self.reference_m_per_s;
         self.since_release_s += elapsed_s;
@@ -217,7 +217,7 @@ impl Latch {
         }
     }
 
-    /// Whether the tip follows the reference, or nothing has confirmed the contact in time.
+    /// Returns whether the latch closed by mistake: the tip follows the reference, or nothing has confirmed the contact in time.
     #[inline]
     fn is_false(&self, config: &ContactLatch) -> bool {
         config.release_s.is_finite()

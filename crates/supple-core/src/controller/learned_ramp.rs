@@ -1,25 +1,25 @@
-//! The learned terms in force, and the ramp to those to come.
+//! The learned terms in force, and the ramp to new terms.
 
 use crate::model::learned::LearnedTerms;
 
 /// Time in which new terms come into force \[s\].
 pub const LEARNED_RAMP_S: f64 = 1.0;
 
-/// The terms in force and those to come.
+/// The learned terms in force, and the ramp to their target.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Learned<const N: usize> {
-    /// New terms are accepted.
+    /// Whether learning is on, so that new terms are accepted.
     pub on: bool,
     pub current: LearnedTerms<N>,
     pub target: LearnedTerms<N>,
     /// Cycles until the target is in force.
     pub cycles_left: u32,
-    /// Any number is not zero; otherwise nothing is computed.
+    /// Whether any term is not zero; otherwise no learned torque is computed.
     pub in_use: bool,
 }
 
 impl<const N: usize> Learned<N> {
-    /// The terms of a configuration, in force.
+    /// Starts with the terms of the configuration in force.
     pub fn new(initial: &LearnedTerms<N>) -> Self {
         Learned {
             on: false,
@@ -37,7 +37,7 @@ impl<const N: usize> Learned<N> {
         self.in_use = true;
     }
 
-    /// One cycle of the ramp. It ends exactly at the target.
+    /// Advances the ramp by one cycle. The ramp ends exactly at the target.
     #[inline(never)]
     pub fn advance(&mut self) {
         let share = 1.0 / f64::from(self.cycles_left);

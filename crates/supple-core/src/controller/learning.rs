@@ -1,8 +1,8 @@
-//! What is learned, in the controller: received by requests, brought into force along a ramp, applied as one torque term.
+//! Learned terms in the controller: requests set them, a ramp brings them into force, and they act as one torque term.
 //!
-//! Nothing is estimated here. A request replaces the target of the ramp; the terms in force approach it linearly, so
-//! that no torque steps. In contact, in faults, without torque and in modes in which people push, the ramp pauses
-//! and new terms are refused.
+//! The controller does not estimate. A request replaces the target of the ramp; the terms in force approach the target
+//! linearly, so that the torque does not jump. The ramp pauses in contact, in faults, without torque and in modes in which
+//! people push the arm; new terms are refused in faults, without torque and in those modes.
 
 use super::Controller;
 use super::activity::Activity;
@@ -18,7 +18,7 @@ use crate::model::learned::{JointMap, LearnedParameters, LearnedTerms, OutOfBoun
 use crate::trajectory::Reference;
 
 impl Mode {
-    /// Whether the model may be refined in this mode: the arm moves by itself, and nobody is to push it.
+    /// Returns whether the model may be refined in this mode: the arm moves by itself, and nobody is expected to push it.
     pub fn allows_learning(self) -> bool {
         matches!(
             self,
@@ -28,12 +28,12 @@ impl Mode {
 }
 
 impl<const N: usize> State<N> {
-    /// Switches learning on or off, or goes back to the configuration's terms.
+    /// Switches learning on or off, or returns to the configuration's terms.
     pub(super) fn switch_learning(&mut self, config: &Config<N>, switch: LearningSwitch) {
         match switch {
             LearningSwitch::On => self.learned.on = true,
             LearningSwitch::Off => self.learned.on = false,
-            LearningSwitch::Reset if self.applies_learned(config) => {
+            LearningSwitch::Reset if self.learned_torques_act(config) => {
                 self.learned.approach(config.learned, config.period_s);
             }
             LearningSwitch::Reset => {
@@ -46,12 +46,12 @@ impl<const N: usize> State<N> {
         }
     }
 
-    pub(super) fn receive_learned(
+    pub(super) fn apply_learned_parameters(
         &mut self,
         controller: &Controller<N>,
         parameters: &LearnedParameters<N>,
     ) -> Result<(), Refusal> {
-        self.accepts_learned()?;
+        self.check_learning_allowed()?;
         let bounds = &controller.learned_bounds;
         bounds.check(parameters).map_err(out_of_bounds)?;
         let target = LearnedTerms {
@@ -63,13 +63,13 @@ impl<const N: usize> State<N> {
         Ok(())
     }
 
-    pub(super) fn receive_learned_map(
+    pub(super) fn apply_learned_map(
         &mut self,
         controller: &Controller<N>,
         joint: usize,
         map: &JointMap,
     ) -> Result<(), Refusal> {
-        self.accepts_learned()?;
+        self.check_learning_allowed()?;
         if joint >= N {
             return Err(Refusal::Value {
                 entry: "joint of the learned map",
@@ -85,7 +85,7 @@ impl<const N: usize> State<N> {
         Ok(())
     }
 
-    fn accepts_learned(&self) -> Result<(), Refusal> {
+    fn check_learning_allowed(&self) -> Result<(), Refusal> {
         let mode = self.mode();
         if !self.learned.on {
             return Err(Refusal::LearningOff);
@@ -96,20 +96,20 @@ impl<const N: usize> State<N> {
         Err(Refusal::Mode { mode })
     }
 
-    /// Whether learned torques act: not without torque, in a fault or on a stale state.
-    fn applies_learned(&self, config: &Config<N>) -> bool {
+    /// Returns whether learned torques act: not without torque, in a fault or on a stale state.
+    fn learned_torques_act(&self, config: &Config<N>) -> bool {
         !(self.activity.is_torque_off() || self.fault.is_some() || self.is_stale(config))
     }
 
-    /// Advances the ramp and evaluates the terms in force at this pose; `None` if there are none, or no torque may
-    /// come of them.
+    /// Advances the ramp and evaluates the terms in force at this pose. Returns `None` if all terms are zero, or if learned
+    /// torques must not act.
     pub(super) fn learned_at_pose(
         &mut self,
         config: &Config<N>,
         reference: Option<&Reference>,
         elapsed_s: f64,
     ) -> Option<LearnedAtPose<N>> {
-        if !self.learned.in_use || !self.applies_learned(config) {
+        if !self.learned.in_use || !self.learned_torques_act(config) {
             return None;
         }
         if self.learned.cycles_left > 0 {
@@ -134,8 +134,8 @@ impl<const N: usize> State<N> {
         ))
     }
 
-    /// Torque that acts on the arm when `torque` is commanded, and the change of the model's torque at the measured
-    /// motion: what the observer needs.
+    /// Returns the inputs of the observer from learned terms: the torque that acts on the arm while `torque` is commanded, and
+    /// the learned change of the model's torque at the measured motion \[N m\].
     pub(super) fn learned_in_observer(
         &self,
         learned: Option<&LearnedAtPose<N>>,
@@ -152,7 +152,7 @@ impl<const N: usize> State<N> {
         )
     }
 
-    /// The learned term beside the others in `torques`.
+    /// Returns the learned torque term, given the other terms in `torques` \[N m\].
     pub(super) fn learned_torques(
         &self,
         controller: &Controller<N>,
@@ -183,7 +183,8 @@ impl<const N: usize> State<N> {
         learned_torque_nm(terms, &controller.learned_bounds, &model, &change)
     }
 
-    /// Joint velocities at which this activity feeds learned friction forward; zero where it feeds none.
+    /// Returns the joint velocities at which this activity feeds learned friction forward \[rad/s\]; zero for joints without
+    /// this feed-forward.
     fn friction_velocity(
         &self,
         config: &Config<N>,
@@ -194,7 +195,7 @@ impl<const N: usize> State<N> {
         let measured = &self.estimator.velocity_rad_per_s;
         let is_active = |i: usize| config.roles[i] == Role::Active;
         match (&self.activity, task, reference, pose) {
-            // What is learned of the friction damps a hand's motion; only the model's share is compensated.
+            // Learned friction is not compensated while a hand guides the arm; only a share of the model's friction is.
             (Activity::Float, ..) => Vector::zeros(),
             (_, Some(task), Some(reference), pose) => {
                 let along = match pose {

@@ -7,7 +7,7 @@
 use crate::config::Limits;
 use crate::math::{Matrix, Vector, abs, all_finite};
 
-/// Joints that share motors with each other, directly or through others.
+/// Groups of joints that share motors, directly or through other joints.
 #[derive(Clone, Copy, Debug)]
 pub struct MotorGroups<const N: usize> {
     motor_from_joint_torque: Matrix<N, N>,
@@ -47,16 +47,16 @@ impl<const N: usize> MotorGroups<N> {
     }
 }
 
-/// The limited torque, and which limits acted.
+/// A limited torque, with flags for the limits that acted.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limited<const N: usize> {
+pub struct LimitedTorque<const N: usize> {
     /// The torque \[N m\].
     pub torque_nm: Vector<N>,
-    /// A joint or motor limit acted.
+    /// Whether a joint or motor limit acted.
     pub torque_limited: bool,
-    /// The rate limit acted.
+    /// Whether the rate limit acted.
     pub rate_limited: bool,
-    /// The torque was finite.
+    /// Whether the torque was finite.
     pub finite: bool,
 }
 
@@ -68,11 +68,11 @@ pub fn limit<const N: usize>(
     last_nm: &Vector<N>,
     demand_nm: &Vector<N>,
     step_nm: &Vector<N>,
-) -> Limited<N> {
+) -> LimitedTorque<N> {
     let (allowed, torque_limited) = limit_torque(limits, groups, demand_nm);
     let (torque_nm, rate_limited) = limit_rate(groups, last_nm, &allowed, step_nm);
     let finite = all_finite(&torque_nm);
-    Limited {
+    LimitedTorque {
         torque_nm: if finite { torque_nm } else { Vector::zeros() },
         torque_limited,
         rate_limited,

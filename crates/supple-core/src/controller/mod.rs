@@ -47,7 +47,7 @@ pub use prepared::Controller;
 
 pub use fault::{Fault, SafeAction};
 pub use learned_ramp::LEARNED_RAMP_S;
-pub use limiter::{Limited, MotorGroups, limit, limit_torque};
+pub use limiter::{LimitedTorque, MotorGroups, limit, limit_torque};
 pub use mode::{Breakaway, LearningSwitch, Mode, Refusal, Request, SetPoint};
 pub use motion_check::{check_motion, check_references};
 pub use output::{CycleRecord, Input, Orientation, Output};

@@ -9,7 +9,7 @@ use crate::record::Text;
 use crate::trajectory::{Fourier, Rotation, Trajectory, TrajectoryError};
 use core::fmt;
 
-/// The modes, each declared once with its number, which once given keeps its meaning, and its name.
+/// Declares each mode once, with its name and its number. A number keeps its meaning for ever.
 macro_rules! modes {
     (
         $(#[$enum:meta])+
@@ -22,7 +22,7 @@ macro_rules! modes {
             $($(#[doc = $meaning])+ $mode = $number,)+
         }
 
-        /// Every mode, at the place of its number.
+        /// Every mode, at the index of its number.
         pub const MODES: [Mode; [$($number),+].len()] = [$(Mode::$mode),+];
 
         const _: () = {
@@ -120,8 +120,8 @@ pub enum Request<const N: usize> {
     /// Follows a trajectory that starts near the tip; the mode is [`Mode::Probe`] for the probing
     /// cycle and [`Mode::Track`] otherwise.
     Track(Trajectory),
-    /// Brings the reference of the tip to a point at a given cycle, from wherever it is, and to rest behind it. Set-points
-    /// that follow one another make a continuous motion; silence ends in a held position. Only while a
+    /// Moves the reference of the tip from its present state to a point at a given cycle, and brings it to rest after the point.
+    /// Successive set-points make a continuous motion; without a further set-point the reference rests. Accepted only while a
     /// [`Trajectory::Hold`] or earlier set-points are tracked; the mode stays [`Mode::Track`].
     SetPoint(SetPoint),
     /// Follows a Fourier series of all joints, from near its start.
@@ -156,9 +156,9 @@ pub enum Request<const N: usize> {
     },
     /// Follows a trajectory that starts near the tip, while the tip turns from its present orientation.
     TrackPose {
-        /// Of the tip's position.
+        /// Trajectory of the tip's position.
         trajectory: Trajectory,
-        /// Of its orientation.
+        /// Rotation of the tip's orientation.
         rotation: Rotation,
     },
     /// Changes the gains of the tip's orientation linearly over `ramp_s` to diagonal matrices about the base axes.
@@ -168,8 +168,8 @@ pub enum Request<const N: usize> {
         /// Ramp time \[s\], zero or more.
         ramp_s: f64,
     },
-    /// Changes the gains of the pose mode linearly over `ramp_s`, to matrices about the axes of the base or of the tip. Linear
-    /// gains of the other modes are not changed. Only for arms with six or more active joints.
+    /// Changes the gains of the track pose mode linearly over `ramp_s`, to matrices about the axes of the base or of the tip.
+    /// Linear gains of the other modes are not changed. Only for arms with six or more active joints.
     GainMatrices {
         /// Directions that change.
         part: GainPart,
@@ -182,10 +182,10 @@ pub enum Request<const N: usize> {
     },
     /// Switches the refinement of the model while the arm moves.
     Learning(LearningSwitch),
-    /// Brings learned parameters into force, along a ramp of [`LEARNED_RAMP_S`](super::LEARNED_RAMP_S). Only while
+    /// Applies learned parameters along a ramp of [`LEARNED_RAMP_S`](super::LEARNED_RAMP_S). Accepted only while
     /// learning is on and the mode allows it ([`Mode::allows_learning`]).
     LearnedParameters(LearnedParameters<N>),
-    /// Brings the learned map of a joint into force, likewise.
+    /// Applies the learned map of a joint, along the same ramp and under the same conditions.
     LearnedMap {
         /// Joint index.
         joint: usize,
@@ -208,35 +208,35 @@ pub struct SetPoint {
     pub at_cycle: u64,
 }
 
-/// What a request asks of learning.
+/// Change of learning that a request asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LearningSwitch {
-    /// The learned terms stay as they are.
+    /// Learning ends; the learned terms keep their values.
     Off,
-    /// New terms are accepted.
+    /// Learning starts: the controller accepts new terms.
     On,
-    /// The terms go back to those of the configuration, along the ramp. Learning stays on or off.
+    /// The learned terms return to those of the configuration along the ramp. Learning stays on or off.
     Reset,
 }
 
-/// A torque ramp on one joint, added to gravity compensation and to what a position loop held the joint with, until the
-/// joint has moved. Refused while the joints' set-points move.
+/// A torque ramp on one joint, added to gravity compensation and to the torque with which a position loop held the joint, until
+/// the joint has moved. The controller refuses it while the joints' set-points move.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Breakaway {
     /// Joint index.
     pub joint: usize,
     /// Slope of the ramp \[N m/s\], not zero; its sign is the direction.
     pub rate_nm_per_s: f64,
-    /// Angle from the start at which it ends \[rad\], positive.
+    /// Angle from the start at which the ramp ends \[rad\], positive.
     pub stop_rad: f64,
-    /// Torque of the ramp alone at which it ends without motion \[N m\], positive, within the joint's limit.
+    /// Torque of the ramp alone at which the ramp ends without motion \[N m\], positive, within the joint's limit.
     pub limit_nm: f64,
 }
 
-/// Why a request was refused. A refused request changes nothing.
+/// Reason for the refusal of a request. A refused request changes nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Refusal {
-    /// Not possible in this mode.
+    /// The request is not possible in the present mode.
     Mode {
         /// Current mode.
         mode: Mode,

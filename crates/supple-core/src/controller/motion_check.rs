@@ -5,7 +5,7 @@ use super::Controller;
 use super::checks::COMPLIANT_SPEED_SHARE;
 use super::mode::{Refusal, Request};
 use super::pose_task::{DIRECTIONS, pose_reference};
-use super::request_checks::{active_target, check_pose_joints, check_stops};
+use super::request_checks::{check_pose_joints, check_position_limits, target_with_held_joints};
 use crate::config::{Config, Role};
 use crate::dynamics::inverse_kinematics::inverse_kinematics;
 use crate::dynamics::{Terms, terms};
@@ -22,14 +22,15 @@ const MAX_PERIODS: f64 = 1000.0;
 const REACHED_M: f64 = 1e-3;
 /// Maximum angle at which an orientation counts as reached \[rad\].
 const REACHED_RAD: f64 = 1e-3;
-/// Newton steps from one pose to the next.
+/// Maximum number of Newton steps from one pose to the next.
 const NEWTON_STEPS: u32 = 20;
-/// The same for a point of the tip.
+/// Maximum number of Newton steps from one tip position to the next.
 const POINT_STEPS: u32 = 5;
 /// Fraction of the torque limits available to the feed-forward of a motion; the rest is for
 /// feedback.
 const TORQUE_SHARE: f64 = 0.9;
-/// Fraction of the speed limits available to the reference of a motion: an arm that has lagged behind is faster where it catches up.
+/// Fraction of the speed limits available to the reference of a motion: an arm that lags moves faster than its reference
+/// when it catches up.
 const SPEED_SHARE: f64 = 0.95;
 
 /// Checks a requested motion from the current pose. Requests without a motion pass.
@@ -61,13 +62,13 @@ pub fn check_motion<const N: usize>(
         Request::Move {
             target_rad,
             duration_s,
-        } => check_joint_line(config, 1.0, position_rad, target_rad, *duration_s),
+        } => check_minimum_jerk_move(config, 1.0, position_rad, target_rad, *duration_s),
         Request::JointImpedance {
             target_rad,
             duration_s,
         } => {
-            let target_rad = active_target(config, position_rad, target_rad);
-            check_joint_line(
+            let target_rad = target_with_held_joints(config, position_rad, target_rad);
+            check_minimum_jerk_move(
                 config,
                 COMPLIANT_SPEED_SHARE,
                 position_rad,
@@ -89,8 +90,8 @@ pub fn check_motion<const N: usize>(
     }
 }
 
-/// Checks a motion of the tip that set-points are to describe, from a pose near its first sample: times \[s\] and
-/// references, in order. Each sample is checked as [`check_motion`] checks those of a trajectory.
+/// Checks a tip motion that set-points will request, given as times \[s\] and references in order, from a pose near the
+/// first sample. The checks of a sample are those of [`check_motion`] for a trajectory.
 ///
 /// # Errors
 /// The first [`Refusal`] along the motion.
@@ -108,7 +109,7 @@ pub fn check_references<const N: usize>(
 }
 
 /// Checks a minimum-jerk motion on a straight line in joint space.
-fn check_joint_line<const N: usize>(
+fn check_minimum_jerk_move<const N: usize>(
     config: &Config<N>,
     speed_share: f64,
     from_rad: &Vector<N>,
@@ -127,7 +128,7 @@ fn check_joint_line<const N: usize>(
     })
 }
 
-/// Checks one point of a tip motion, and moves the joints there from a pose that is near.
+/// Checks one point of a tip motion. `q` is a pose near it and becomes the pose at the point.
 fn check_point<const N: usize>(
     config: &Config<N>,
     q: &mut Vector<N>,
@@ -169,8 +170,9 @@ fn check_point<const N: usize>(
     check_joints(config, 1.0, &dynamics, &qd, &qdd)
 }
 
-/// Moves the joints from a pose that is near to one with the tip at `position`, as the law does: a redundant arm turns its light
-/// joints most. `state` is that of the pose found. `None` if that does not lead there within a few steps, or beyond the soft stops.
+/// Returns a pose with the tip at `position`, found by Newton steps from a pose near it with the law's own inverse of the
+/// Jacobian: a redundant arm moves its light joints most. `state` becomes the state of the pose. Returns `None` if the steps do
+/// not converge, or if the pose exceeds the position limits.
 fn follow_point<const N: usize>(
     config: &Config<N>,
     from_rad: &Vector<N>,
@@ -182,7 +184,7 @@ fn follow_point<const N: usize>(
         terms(&config.arm, &q, &Vector::zeros(), state);
         let error = position - state.base_from_tip.translation;
         if error.norm() <= REACHED_M {
-            return check_stops(config, &q).is_ok().then_some(q);
+            return check_position_limits(config, &q).is_ok().then_some(q);
         }
         let task = Task::new(state, &config.roles)?;
         q += task.inverse * error;
@@ -190,7 +192,7 @@ fn follow_point<const N: usize>(
     None
 }
 
-/// Follows position and orientation with the joints' motion that the task gives, starting from rest.
+/// Checks a motion of position and orientation, with the joint motion that the task's inverse gives, starting from rest.
 fn check_pose<const N: usize>(
     config: &Config<N>,
     from_rad: &Vector<N>,
@@ -213,7 +215,7 @@ fn check_pose<const N: usize>(
         }
         let reference = pose_reference(&position, &rotation.at(&start, time_s));
         let task = solve_pose(config, &reference.base_from_tip, &mut q, &mut state, time_s)?;
-        check_stops(config, &q)?;
+        check_position_limits(config, &q)?;
         let velocity = task.inverse * reference.velocity();
         terms(&config.arm, &q, &velocity, &mut state);
         let acceleration = task.inverse * (reference.acceleration() - state.jacobian_dot_qd);
@@ -222,7 +224,7 @@ fn check_pose<const N: usize>(
     Ok(())
 }
 
-/// Moves the joints to a pose of the tip from one that is near, by Newton steps; returns the task there.
+/// Moves `q` to a pose of the tip near it by Newton steps, and returns the task in that pose.
 fn solve_pose<const N: usize>(
     config: &Config<N>,
     wanted: &Pose,

@@ -1,4 +1,4 @@
-//! Damping in the null space of the position task that the delay of the loop allows.
+//! Null-space damping of the position task that the loop's delay allows.
 //!
 //! With a delayed velocity, damping `D` of joints with mass matrix `H` is stable while the greatest eigenvalue of
 //! `H^-1 D` stays below the margin over the delay. For a diagonal `D` that eigenvalue is at most the sum of
@@ -12,10 +12,10 @@ use crate::math::{Matrix, Vector};
 
 /// Poses at which the mass matrix is computed, spread over the joint ranges.
 const POSES: u32 = 64;
-/// Ranges wider than a turn to each side hold no other poses \[rad\].
+/// Limit of the joint angles considered \[rad\]: a wider range repeats the same poses.
 const TURN_RAD: f64 = core::f64::consts::PI;
 
-/// Damping of each joint \[N m s/rad\]: that of the law, or less where the delay does not allow it.
+/// Returns the damping of each joint \[N m s/rad\]: the damping of the law, or less if the delay does not allow it.
 pub(super) fn nullspace_damping_nm_s_per_rad<const N: usize>(
     config: &Config<N>,
     delay_s: f64,
@@ -53,8 +53,8 @@ fn active_mass_matrix<const N: usize>(config: &Config<N>, q: &Vector<N>) -> Matr
     })
 }
 
-/// Angle of a joint in one of the poses \[rad\]: multiples of irrational numbers that are independent of each other
-/// spread them evenly.
+/// Returns the angle of a joint in one of the poses \[rad\]. Multiples of independent irrational numbers spread the poses
+/// evenly.
 fn at_pose<const N: usize>(config: &Config<N>, pose: u32, joint: usize) -> f64 {
     const ROOTS: [f64; 7] = [
         core::f64::consts::SQRT_2,

@@ -23,14 +23,14 @@ pub struct Input<const N: usize> {
     pub position_rad: [Option<f64>; N],
     /// Measured force on the tip, base axes \[N\]; used only with a chosen apparent inertia.
     pub tip_force_n: Option<Vector3<f64>>,
-    /// The motors apply the torques that they are sent. If they do not, the controller holds gravity at the
-    /// present pose.
+    /// Whether the motors apply the commanded torques. If they do not, the controller computes gravity compensation at
+    /// the present pose.
     pub drives_active: bool,
     /// The operator's request, if there is one.
     pub request: Option<Request<N>>,
 }
 
-/// Reference of the tip's orientation in the pose mode, and how far the tip is from it.
+/// Reference of the tip's orientation in the track pose mode, and the tip's deviation from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orientation {
     /// The reference: columns are the axes of the tip in base coordinates.
@@ -71,7 +71,8 @@ macro_rules! in_record {
     (terms, $n:ident) => { Torques<$n> };
 }
 
-/// Three lists: what is in the record alone, with its value; what is in both; what is in the output alone.
+/// Declares the quantities in three lists: those of the record alone, with their values; those of both; those of the output
+/// alone.
 macro_rules! cycle {
     (
         record($step:ident, $input:ident, $output:ident; $($code:ident = $of:expr),+) {
@@ -126,15 +127,15 @@ macro_rules! cycle {
             /// Writes the words of every field, [`CycleRecord::words`] of them.
             ///
             /// # Panics
-            /// If there is room for fewer.
+            /// If `words` is too short.
             pub fn pack(&self, words: &mut [u64]) {
                 let mut to = Pack::new(words);
                 $(Recorded::<N>::pack(&self.$record, &mut to);)*
                 $(Recorded::<N>::pack(&self.$both, &mut to);)*
             }
 
-            /// Reads what [`CycleRecord::pack`] wrote for an arm of `joints` joints: the first `N` of them; the values
-            /// of joints that are not there are zero.
+            /// Reads the first `N` joints of a record that [`CycleRecord::pack`] wrote for an arm of `joints` joints; values of
+            /// joints that the arm does not have are zero.
             pub fn unpack(words: &[u64], joints: usize) -> Self {
                 let mut from = Unpack::new(words, joints);
                 CycleRecord {
@@ -355,17 +356,17 @@ impl<const N: usize> CycleRecord<N> {
         words_of(Self::FIELDS, joints)
     }
 
-    /// The record of a step with this output, its texts with these joint names.
+    /// Returns the record with the fault and refusal texts of `output` written with these joint names.
     pub fn with_joint_names(mut self, output: &Output<N>, names: &JointNames<N>) -> Self {
         self.fault_text = in_words(output.fault.as_ref(), names.as_slice());
         self.refusal_text = in_words(output.refusal.as_ref(), names.as_slice());
         self
     }
 
-    /// The input of the step, to the last bit.
+    /// Returns the input of the step, bit for bit.
     ///
     /// # Errors
-    /// A request that this version does not have.
+    /// An error if this version does not have the recorded request.
     pub fn input(&self) -> Result<Input<N>, RequestCodeError> {
         let position =
             |i: usize| self.has_measured_position[i].then_some(self.measured_position_rad[i]);
@@ -378,10 +379,10 @@ impl<const N: usize> CycleRecord<N> {
         })
     }
 
-    /// The request as numbers.
+    /// Returns the request as numbers.
     ///
     /// # Errors
-    /// More values than a request has.
+    /// An error if the record has more values than a request can have.
     pub fn request_code(&self) -> Result<RequestCode, RequestCodeError> {
         RequestCode::from_parts(self.request, self.trajectory, self.request_values.values())
     }

@@ -9,29 +9,29 @@
 //! | collision | the observed external torque or force exceeds its threshold |
 
 use super::fault::Fault;
-use super::reversed_encoder::{Evidence, SuddenReversal};
+use super::reversed_encoder::{ReversalVerdict, SuddenReversal};
 use crate::config::{Config, PlausibilityLimits};
 use crate::math::{Vector, Vector3, abs, sqrt};
 
 const LOSS_WEIGHT: u32 = 8;
 const AGAINST_CYCLES: u32 = 20;
-/// Smallest growth of a joint's momentum against its net torque, as a fraction of what the torque would cause in its own direction.
-/// A reversed encoder shows all of it; a hand that guides a joint against its friction shows little.
+/// Minimum growth of a joint's momentum against its net torque, as a fraction of the growth that the torque would cause in its
+/// own direction. A reversed encoder gives a fraction of one, a hand that guides a joint against its friction a small one.
 const GROWTH_SHARE: f64 = 0.1;
-/// Torque that a sudden reversal of a joint needs, as a multiple of the limit of what may oppose its motion.
+/// Minimum torque of a sudden reversal, as a multiple of the limit of the torque that may oppose the joint's motion.
 const REVERSING_RATIO: f64 = 6.0;
-/// Lags `1 / w` of the velocity estimate within which it follows such a reversal to some hundredths.
+/// Settling time of the velocity estimate after such a reversal, to a few per cent, in lags `1 / w` of the estimate.
 const SETTLING_LAGS: f64 = 5.0;
 const LOAD_S: f64 = 0.05;
 /// Maximum ratio of the force perpendicular to gravity to the force along it, for a load.
 const MAX_LATERAL_SHARE: f64 = 0.5;
 
-/// What was lost, opposed and carried in the last cycles.
+/// Lost replies, motion against torque, and load in the last cycles.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plausibility<const N: usize> {
-    /// Lost replies of each joint, weighed.
-    losses: [u32; N],
-    opposed_cycles: [u32; N],
+    /// Balance of lost and received replies of each joint.
+    weighted_losses: [u32; N],
+    against_torque_cycles: [u32; N],
     last_momentum: Vector<N>,
     reversal: Option<SuddenReversal>,
     load_s: f64,
@@ -40,8 +40,8 @@ pub(super) struct Plausibility<const N: usize> {
 impl<const N: usize> Default for Plausibility<N> {
     fn default() -> Self {
         Plausibility {
-            losses: [0; N],
-            opposed_cycles: [0; N],
+            weighted_losses: [0; N],
+            against_torque_cycles: [0; N],
             last_momentum: Vector::zeros(),
             reversal: None,
             load_s: 0.0,
@@ -51,23 +51,22 @@ impl<const N: usize> Default for Plausibility<N> {
 
 /// Limits of a motion against its torque.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct AgainstLimits<const N: usize> {
+pub(super) struct AgainstTorqueLimits<const N: usize> {
     /// Torque that may oppose a joint's acceleration \[N m\].
     torque_nm: Vector<N>,
-    /// Sum of the squared changes of the momentum within a period below which no joint has turned round suddenly
-    /// \[(N m s)^2\].
+    /// Squared change of the momentum within a period below which no joint can have reversed suddenly \[(N m s)^2\].
     sudden_momentum_squared: f64,
-    /// Cycles within which the velocity estimate follows a sudden reversal.
+    /// Cycles within which the velocity estimate settles after a sudden reversal.
     settling_cycles: u32,
 }
 
-impl<const N: usize> AgainstLimits<N> {
-    pub fn new(config: &Config<N>) -> AgainstLimits<N> {
+impl<const N: usize> AgainstTorqueLimits<N> {
+    pub fn new(config: &Config<N>) -> AgainstTorqueLimits<N> {
         let torque_nm = config.limits.joint_torque_nm * config.plausible.against_share;
-        let least_nm_s = REVERSING_RATIO * torque_nm.min() * config.period_s;
-        AgainstLimits {
+        let min_nm_s = REVERSING_RATIO * torque_nm.min() * config.period_s;
+        AgainstTorqueLimits {
             torque_nm,
-            sudden_momentum_squared: least_nm_s * least_nm_s,
+            sudden_momentum_squared: min_nm_s * min_nm_s,
             settling_cycles: (SETTLING_LAGS / (config.estimator_rad_per_s * config.period_s))
                 as u32
                 + 1,
@@ -86,33 +85,33 @@ pub(super) struct JointMotion<'a, const N: usize> {
 }
 
 impl<const N: usize> Plausibility<N> {
-    /// Weighs the encoder replies of a cycle; `all` of them, if none is missing.
+    /// Checks how often encoder replies are lost; `all_received` if none is missing in this cycle.
     #[inline(always)]
-    pub fn receive_replies(
+    pub fn check_replies(
         &mut self,
         plausible: &PlausibilityLimits,
         measured_rad: &[Option<f64>; N],
-        all: bool,
+        all_received: bool,
     ) -> Result<(), Fault> {
-        if all && self.losses == [0; N] {
+        if all_received && self.weighted_losses == [0; N] {
             return Ok(());
         }
-        self.weigh_replies(plausible, measured_rad)
+        self.check_lost_replies(plausible, measured_rad)
     }
 
     #[inline(never)]
-    fn weigh_replies(
+    fn check_lost_replies(
         &mut self,
         plausible: &PlausibilityLimits,
         measured_rad: &[Option<f64>; N],
     ) -> Result<(), Fault> {
         for (joint, measured) in measured_rad.iter().enumerate() {
-            self.losses[joint] = match measured {
-                Some(_) => self.losses[joint].saturating_sub(1),
-                None => self.losses[joint] + LOSS_WEIGHT,
+            self.weighted_losses[joint] = match measured {
+                Some(_) => self.weighted_losses[joint].saturating_sub(1),
+                None => self.weighted_losses[joint] + LOSS_WEIGHT,
             };
-            if self.losses[joint] > LOSS_WEIGHT.saturating_mul(plausible.lost_replies) {
-                self.losses[joint] = 0;
+            if self.weighted_losses[joint] > LOSS_WEIGHT.saturating_mul(plausible.lost_replies) {
+                self.weighted_losses[joint] = 0;
                 return Err(Fault::EncoderUnreliable { joint });
             }
         }
@@ -121,22 +120,22 @@ impl<const N: usize> Plausibility<N> {
 
     /// Resets the accumulated evidence at a change of activity.
     pub fn begin(&mut self) {
-        self.opposed_cycles = [0; N];
+        self.against_torque_cycles = [0; N];
         self.reversal = None;
         self.load_s = 0.0;
     }
 
-    /// Suspends the checks in this cycle.
+    /// Skips the checks in this cycle.
     pub fn suspend(&mut self, momentum: &Vector<N>) {
         self.last_momentum = *momentum;
     }
 
     /// Checks that no joint moves against its torque. `net_torque` is the rate of change of the momentum without external
-    /// torque \[N m\], the velocities are those of the joints and of their references \[rad/s\].
+    /// torque \[N m\].
     #[inline(always)]
     pub fn check_against_torque(
         &mut self,
-        limits: &AgainstLimits<N>,
+        limits: &AgainstTorqueLimits<N>,
         motion: &JointMotion<'_, N>,
         net_torque: &Vector<N>,
         elapsed_s: f64,
@@ -145,7 +144,7 @@ impl<const N: usize> Plausibility<N> {
         let last = core::mem::replace(&mut self.last_momentum, *momentum);
         let change = momentum - last;
         if change.dot(&change) > limits.sudden_momentum_squared {
-            self.note_reversal(limits, motion, &change, elapsed_s);
+            self.find_sudden_reversal(limits, motion, &change, elapsed_s);
         }
         if self.reversal.is_some() {
             self.check_reversal(limits, motion)?;
@@ -154,14 +153,15 @@ impl<const N: usize> Plausibility<N> {
             let limit_nm = limits.torque_nm[joint];
             let opposing = -net_torque[joint] * momentum[joint];
             let opposed = opposing > 0.0 && abs(net_torque[joint]) > limit_nm;
-            // By the change of momentum that the net torque would cause.
+            // Relative to the change of momentum that the net torque would cause.
             let accelerates = change[joint] * momentum[joint] > GROWTH_SHARE * opposing * elapsed_s;
             if accelerates && opposed {
-                self.opposed_cycles[joint] += 1;
+                self.against_torque_cycles[joint] += 1;
             } else {
-                self.opposed_cycles[joint] = self.opposed_cycles[joint].saturating_sub(2);
+                self.against_torque_cycles[joint] =
+                    self.against_torque_cycles[joint].saturating_sub(2);
             }
-            if self.opposed_cycles[joint] > AGAINST_CYCLES {
+            if self.against_torque_cycles[joint] > AGAINST_CYCLES {
                 return Err(Fault::MotionAgainstTorque {
                     joint,
                     value_nm: abs(net_torque[joint]),
@@ -172,12 +172,13 @@ impl<const N: usize> Plausibility<N> {
         Ok(())
     }
 
-    /// Notes a joint that has turned against its reference suddenly. `change` is that of the momentum \[N m s\].
+    /// Finds a joint whose velocity has suddenly reversed against its reference. `change` is the change of the momentum in this
+    /// cycle \[N m s\].
     #[cold]
     #[inline(never)]
-    fn note_reversal(
+    fn find_sudden_reversal(
         &mut self,
-        limits: &AgainstLimits<N>,
+        limits: &AgainstTorqueLimits<N>,
         motion: &JointMotion<'_, N>,
         change: &Vector<N>,
         elapsed_s: f64,
@@ -186,21 +187,21 @@ impl<const N: usize> Plausibility<N> {
             return;
         }
         for joint in 0..N {
-            let turned_round =
+            let reversed =
                 motion.velocity_rad_per_s[joint] * motion.reference_rad_per_s[joint] < 0.0;
             let torque_nm = abs(change[joint]) / elapsed_s;
-            if turned_round && torque_nm > REVERSING_RATIO * limits.torque_nm[joint] {
+            if reversed && torque_nm > REVERSING_RATIO * limits.torque_nm[joint] {
                 self.reversal = Some(SuddenReversal::new(joint, torque_nm));
             }
         }
     }
 
-    /// Follows a joint that has turned round suddenly.
+    /// Reports a fault if the joint that reversed suddenly follows its reversed reference.
     #[cold]
     #[inline(never)]
     fn check_reversal(
         &mut self,
-        limits: &AgainstLimits<N>,
+        limits: &AgainstTorqueLimits<N>,
         motion: &JointMotion<'_, N>,
     ) -> Result<(), Fault> {
         let Some(reversal) = &mut self.reversal else {
@@ -211,13 +212,13 @@ impl<const N: usize> Plausibility<N> {
             motion.velocity_rad_per_s[joint],
             motion.reference_rad_per_s[joint],
         );
-        match reversal.follow(velocity, reference, limits.settling_cycles) {
-            Evidence::Open => Ok(()),
-            Evidence::Refuted => {
+        match reversal.add_cycle(velocity, reference, limits.settling_cycles) {
+            ReversalVerdict::Pending => Ok(()),
+            ReversalVerdict::NotReversed => {
                 self.reversal = None;
                 Ok(())
             }
-            Evidence::Reversed => Err(Fault::MotionAgainstTorque {
+            ReversalVerdict::EncoderReversed => Err(Fault::MotionAgainstTorque {
                 joint,
                 value_nm: reversal.torque_nm,
                 limit_nm: REVERSING_RATIO * limits.torque_nm[joint],
@@ -225,7 +226,7 @@ impl<const N: usize> Plausibility<N> {
         }
     }
 
-    /// Discards the evidence of a load.
+    /// Resets the time for which a load has acted.
     pub fn reset_load(&mut self) {
         self.load_s = 0.0;
     }
@@ -256,9 +257,9 @@ impl<const N: usize> Plausibility<N> {
 /// Speed at which a tip falls away from its reference \[m/s\].
 const FALLING_M_PER_S: f64 = 0.1;
 
-/// Whether the tip moves along gravity, faster than its reference.
+/// Returns whether the tip moves along gravity relative to its reference, faster than [`FALLING_M_PER_S`].
 #[inline(never)]
-pub(super) fn falls(away_m_per_s: &Vector3<f64>, gravity: &Vector3<f64>) -> bool {
+pub(super) fn is_falling_away(away_m_per_s: &Vector3<f64>, gravity: &Vector3<f64>) -> bool {
     let along = away_m_per_s.dot(gravity);
     along > 0.0 && along * along > FALLING_M_PER_S * FALLING_M_PER_S * gravity.dot(gravity)
 }
@@ -272,15 +273,15 @@ pub(super) struct PlausibilityInput<'a, const N: usize> {
     /// Observed force on the tip, base axes \[N\].
     pub force_n: &'a Vector3<f64>,
     /// Whether the tip falls away from its reference.
-    pub falls: bool,
+    pub is_falling_away: bool,
     /// Whether the pose is regular. Near a singular pose a small torque maps to a large force along
     /// the lost direction, so only the thresholds of the joints apply.
-    pub regular: bool,
+    pub pose_is_regular: bool,
     /// Time since the last cycle \[s\].
     pub elapsed_s: f64,
 }
 
-pub(super) fn joint_collision<const N: usize>(
+pub(super) fn check_joint_collision<const N: usize>(
     threshold_nm: &Vector<N>,
     external_nm: &Vector<N>,
 ) -> Result<(), Fault> {
@@ -298,7 +299,7 @@ pub(super) fn joint_collision<const N: usize>(
 }
 
 #[inline]
-pub(super) fn tip_collision(limit_n: f64, force_n: &Vector3<f64>) -> Result<(), Fault> {
+pub(super) fn check_tip_collision(limit_n: f64, force_n: &Vector3<f64>) -> Result<(), Fault> {
     if force_n.dot(force_n) > limit_n * limit_n {
         return Err(Fault::TipCollision {
             value_n: sqrt(force_n.dot(force_n)),

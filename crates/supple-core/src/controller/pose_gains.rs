@@ -1,7 +1,7 @@
-//! Gains of the pose mode: matrices about the axes of the base or of the tip, with ramps between them.
+//! Gains of the track pose mode: matrices about the axes of the base or of the tip, with ramps between them.
 //!
-//! Matrices are positive semi-definite, and so is every matrix on the straight line between two of them: at no time of a ramp is
-//! a stiffness or a damping negative. A ramp that raises the stiffness adds energy, as with any gains.
+//! The matrices are positive semi-definite, and so is every linear interpolation between two of them: during a ramp no
+//! stiffness and no damping is negative. A ramp that raises the stiffness adds energy, as with any gains.
 
 use super::gain_ramp::{GainRamp, Interpolate};
 use crate::config::{Gains, RotationalGains};
@@ -13,8 +13,8 @@ use crate::math::{Matrix3, Vector3};
 pub enum GainAxes {
     /// Axes of the base.
     Base,
-    /// Axes of the tip, where its reference is: the matrices turn with the reference, not with the measured tip, since
-    /// stiffness that follows the measured orientation would have no potential.
+    /// Axes of the tip's reference. The matrices turn with the reference, not with the measured tip, because a stiffness that
+    /// follows the measured orientation would have no potential.
     Tip,
 }
 
@@ -45,13 +45,13 @@ impl GainMatrices {
         }
     }
 
-    /// The symmetric matrix with the entries xx, yy, zz, yz, zx, xy.
+    /// Returns the symmetric matrix with the elements xx, yy, zz, yz, zx, xy.
     pub fn symmetric([xx, yy, zz, yz, zx, xy]: [f64; 6]) -> Matrix3<f64> {
         Matrix3::new(xx, xy, zx, xy, yy, yz, zx, yz, zz)
     }
 
-    /// The same gains about other axes; `rotation` maps coordinates in the present axes to coordinates in those.
-    fn turned(&self, rotation: &Matrix3<f64>) -> GainMatrices {
+    /// Returns the same gains about other axes; `rotation` maps coordinates in the present axes to the new axes.
+    fn rotated(&self, rotation: &Matrix3<f64>) -> GainMatrices {
         GainMatrices {
             stiffness: rotation * self.stiffness * rotation.transpose(),
             damping: rotation * self.damping * rotation.transpose(),
@@ -94,8 +94,8 @@ impl MatrixRamp {
     ) {
         let current = self.ramp.current();
         let from = match (self.axes, axes) {
-            (GainAxes::Base, GainAxes::Tip) => current.turned(&base_from_tip.transpose()),
-            (GainAxes::Tip, GainAxes::Base) => current.turned(base_from_tip),
+            (GainAxes::Base, GainAxes::Tip) => current.rotated(&base_from_tip.transpose()),
+            (GainAxes::Tip, GainAxes::Base) => current.rotated(base_from_tip),
             _ => current,
         };
         *self = MatrixRamp {
@@ -109,9 +109,9 @@ impl MatrixRamp {
         in_base(&self.ramp.current(), self.axes, base_from_tip)
     }
 
-    /// Damping in force and at the end of the ramp, about the base axes: between them every bound that is convex, such as
-    /// that of the fastest rate, is greatest at one of the two.
-    pub fn damping_at_ends(&self, base_from_tip: &Matrix3<f64>) -> [Matrix3<f64>; 2] {
+    /// Returns the damping in force and at the end of the ramp, about the base axes. A convex bound, such as that of the fastest
+    /// damping rate, has its maximum over the ramp at one of these two.
+    pub fn damping_at_ramp_ends(&self, base_from_tip: &Matrix3<f64>) -> [Matrix3<f64>; 2] {
         [self.ramp.current(), self.ramp.to]
             .map(|gains| in_base(&gains, self.axes, base_from_tip).damping)
     }
@@ -132,11 +132,11 @@ pub(super) fn in_base(
 ) -> GainMatrices {
     match axes {
         GainAxes::Base => *gains,
-        GainAxes::Tip => gains.turned(base_from_tip),
+        GainAxes::Tip => gains.rotated(base_from_tip),
     }
 }
 
-/// Gains of the pose mode in force.
+/// Gain ramps of the track pose mode.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PoseGainRamps {
     pub linear: MatrixRamp,

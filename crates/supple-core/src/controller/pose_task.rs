@@ -1,6 +1,6 @@
-//! The pose mode: reference of the tip's position and orientation, the task in six directions, and its torques.
+//! The track pose mode: reference of the tip's position and orientation, the task in six directions, and its torques.
 //!
-//! Nothing of it is computed in other modes, nor compiled for arms of fewer than six joints.
+//! Other modes compute none of this, and it is not compiled for arms with fewer than six joints.
 
 use super::activity::Activity;
 use super::checks::DAMPING_MARGIN;
@@ -17,11 +17,11 @@ use crate::trajectory::{OrientationReference, Reference, Rotation};
 /// Directions of the task.
 pub(super) const DIRECTIONS: usize = 6;
 
-/// What a cycle of the pose mode computes before its torques.
+/// Reference, task and error of a cycle in the track pose mode, from which its torques are computed.
 pub(super) struct PoseCycle<const N: usize> {
     reference: PoseReference,
     task: Task<N, DIRECTIONS>,
-    /// Velocity of the active joints that moves the tip as its reference \[rad/s\].
+    /// Velocity of the active joints at which the tip moves like its reference \[rad/s\].
     pub joint_velocity_rad_per_s: Vector<N>,
     /// Axis times angle from the tip to its reference \[rad\].
     pub error_rad: Vector3<f64>,
@@ -34,7 +34,7 @@ impl<const N: usize> PoseCycle<N> {
     }
 }
 
-/// Position and orientation together.
+/// Combines the references of position and orientation.
 pub(super) fn pose_reference(
     position: &Reference,
     orientation: &OrientationReference,
@@ -52,7 +52,7 @@ pub(super) fn pose_reference(
 }
 
 impl<const N: usize> State<N> {
-    /// Reference and task of the pose mode, with its check; `None` in other modes.
+    /// Returns the checked reference and task of the track pose mode; `None` in other modes.
     #[inline(always)]
     pub(super) fn pose_cycle(
         &self,
@@ -101,7 +101,7 @@ impl<const N: usize> State<N> {
         })
     }
 
-    /// Orientation of the tip's reference; where it has none, of the tip.
+    /// Returns the reference orientation of the tip; in modes without one, the orientation of the tip.
     pub(super) fn reference_orientation(&self, config: &Config<N>) -> Matrix3<f64> {
         match &self.activity {
             Activity::TrackPose {
@@ -116,7 +116,7 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Advances the ramps of the pose mode's gains; arms of fewer than six joints have none.
+    /// Advances the gain ramps of the track pose mode; arms with fewer than six joints have none.
     #[inline(always)]
     pub(super) fn advance_pose_gains(&mut self, elapsed_s: f64) {
         if const { N >= DIRECTIONS } {
@@ -124,8 +124,8 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Rotational gains in force: the diagonals of their matrices. Arms of fewer than six joints have no pose mode, and report
-    /// those of the configuration.
+    /// Returns the diagonals of the rotational gain matrices in force. Arms with fewer than six joints have no track pose mode,
+    /// and report the configured gains.
     #[inline(always)]
     pub(super) fn rotational_gains(&self, config: &Config<N>) -> RotationalGains {
         match const { N >= DIRECTIONS } {
@@ -134,7 +134,7 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Gains of the tip's position in force; in the pose mode the diagonals of its matrices.
+    /// Returns the gains of the tip's position in force; in the track pose mode the diagonals of its matrices.
     #[inline(always)]
     pub(super) fn tip_gains(&self) -> Gains {
         if const { N >= DIRECTIONS } && matches!(self.activity, Activity::TrackPose { .. }) {
@@ -143,8 +143,8 @@ impl<const N: usize> State<N> {
         self.gains.current()
     }
 
-    /// Greatest mobility of the null space \[1/(kg m^2)\]: where the axes of the wrist align, its joints can turn
-    /// against each other, and little inertia resists. With one joint more than directions it is exact.
+    /// Returns the maximum mobility of the null space \[1/(kg m^2)\]. It is large if the axes of the wrist align, because its
+    /// joints can then turn against each other with little inertia. It is exact for a null space of one dimension.
     fn nullspace_mobility(&self, task: &Task<N, DIRECTIONS>) -> f64 {
         let free = Matrix::<N, N>::identity() - task.inverse * task.jacobian;
         let inertia = self.terms.mass_matrix * free;
@@ -156,7 +156,8 @@ impl<const N: usize> State<N> {
             .fold(0.0, f64::max)
     }
 
-    /// The law of the pose: linear and rotational gains, and damping and posture in the null space, both weakened together where the delay of the loop does not allow that much damping.
+    /// Returns the torques of the pose law: linear and rotational gains, and damping and posture in the null space. If the
+    /// loop's delay does not allow that much null-space damping, damping and posture are reduced together.
     #[inline(never)]
     pub(super) fn pose_torques(
         &self,

@@ -1,33 +1,33 @@
-//! The position limits in force: where a joint faults, where its soft stop begins, and where the margins of the
-//! workspace begin.
+//! The position limits in force: the angles beyond which a joint faults, the angles at which its soft stop begins, and the
+//! positions at which the margins of the workspace begin.
 //!
-//! They are those of the configuration, except after a time without them: the drives were idle, or a fault has ended
-//! the motion, and a joint has come to rest in its soft zone or beyond its limit. The whole spring of its soft stop
-//! would accelerate it, and the fault beyond the limit would recur at every reset. Therefore the limits begin where the
-//! joint is: its soft stop pushes only beyond an edge that starts at the joint and returns to its place at
-//! [`EDGE_RAD_PER_S`], or at once as far as somebody moves the joint back, so that the joint follows it at that speed; and it
-//! faults where it moves out by more than
-//! [`OUTWARD_RAD`], or leaves its limit again once it has come back. The margins of the workspace likewise.
+//! They equal the configured limits, except after a time in which no limits applied: the drives were idle, or a fault ended
+//! the motion, and a joint came to rest in its soft zone or beyond its limit. With the configured limits the full spring of the
+//! soft stop would accelerate the joint, and the fault would recur at every reset. Therefore the limits are relaxed to the
+//! joint's angle. The soft stop acts beyond an edge that starts at the joint and returns to its configured angle at
+//! [`EDGE_RAD_PER_S`], so that the joint follows at that speed; if somebody moves the joint back, the edge follows at once. The
+//! joint faults if it moves outwards by more than [`OUTWARD_RAD`], or exceeds its limit again after it has returned. The
+//! margins of the workspace are relaxed in the same way.
 
 use crate::config::Limits;
 use crate::math::{Vector, Vector3, abs};
 use crate::model::workspace::{MAX_BORDERS_OR_ZONES, Workspace};
 
-/// Speed at which the edge of a soft zone returns to its place \[rad/s\]: 50 mm/s at 1 m.
+/// Speed at which the edge of a soft zone returns to its configured angle \[rad/s\]: 50 mm/s at 1 m.
 const EDGE_RAD_PER_S: f64 = 0.05;
-/// The same of a workspace margin \[m/s\].
+/// Speed at which the edge of a workspace margin returns \[m/s\].
 const EDGE_M_PER_S: f64 = 0.05;
-/// Angle by which a joint that is beyond its limit, or just before it, may move further out when its motors take over
+/// Angle by which a joint beyond or near its limit may move further outwards when its motors start to carry
 /// its weight \[rad\].
 const OUTWARD_RAD: f64 = 0.02;
 
-/// Fraction of its speed limit up to which a joint rests: a braked one sinks.
+/// Fraction of its speed limit up to which a joint counts as resting; a joint with braked motors sinks slowly.
 const REST_SHARE: f64 = 0.1;
-/// Angle beyond its limit up to which a resting joint may return \[rad\]; further out its angle is more likely wrong, and it
-/// faults.
+/// Maximum angle beyond its limit from which a resting joint may return \[rad\]. Further out the measured angle is more likely
+/// wrong, and the joint faults.
 const MAX_BEYOND_RAD: f64 = 0.1;
 
-/// Limits of positions that are in force.
+/// Position limits in force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct PositionLimits<const N: usize> {
     /// Angles beyond which a joint faults \[rad\].
@@ -38,7 +38,7 @@ pub(super) struct PositionLimits<const N: usize> {
     pub soft_upper_rad: Vector<N>,
     /// Depth in the margin of each border from which its spring pushes \[m\]: zero or more.
     pub margin_from_m: [f64; MAX_BORDERS_OR_ZONES],
-    /// Some limit is not that of the configuration.
+    /// Whether any limit differs from the configuration.
     pub relaxed: bool,
 }
 
@@ -55,8 +55,8 @@ impl<const N: usize> PositionLimits<N> {
         }
     }
 
-    /// Depth of each joint into its soft zone as a share of it, from 0 outside to 1 or -1 at its far end and beyond, with
-    /// the sign of the torque that pushes the joint back; `None` outside all soft zones.
+    /// Returns the depth of each joint in its soft zone as a fraction of the zone's width, from 0 outside to 1 at its end and
+    /// beyond, with the sign of the torque that pushes the joint back; `None` if no joint is in a soft zone.
     #[inline(always)]
     pub fn soft_zone_depths(&self, zone_rad: f64, position_rad: &Vector<N>) -> Option<Vector<N>> {
         let outside = (0..N).all(|joint| {
@@ -85,8 +85,8 @@ impl<const N: usize> PositionLimits<N> {
         })
     }
 
-    /// The limits that begin where the arm is. Those of the configuration hold for a joint that moves, or is further out than
-    /// [`MAX_BEYOND_RAD`].
+    /// Returns limits relaxed to contain the present pose. The configured limits apply to a joint that moves, or that is further
+    /// out than [`MAX_BEYOND_RAD`].
     pub fn around(
         limits: &Limits<N>,
         workspace: &Workspace,
@@ -125,7 +125,8 @@ impl<const N: usize> PositionLimits<N> {
         around
     }
 
-    /// Brings the limits back: the edges with their speed, all of them as far as the arm has come back.
+    /// Tightens relaxed limits towards the configured ones: the edges at their speed, and all limits as far as the arm has moved
+    /// back.
     pub fn restore(
         &mut self,
         limits: &Limits<N>,

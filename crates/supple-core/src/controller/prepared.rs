@@ -1,10 +1,10 @@
-//! A configuration, checked, with the constants that every step takes from it.
+//! The controller: a validated configuration and the constants derived from it.
 
 use super::encoders::{EncoderStep, Encoders};
 use super::estimator::EstimatorGains;
 use super::limiter::MotorGroups;
 use super::nullspace::nullspace_damping_nm_s_per_rad;
-use super::plausibility::AgainstLimits;
+use super::plausibility::AgainstTorqueLimits;
 use super::validate::{self, ConfigError};
 use crate::config::{Config, RippleTable};
 use crate::law::task::count_active;
@@ -25,25 +25,25 @@ pub struct Controller<const N: usize> {
     pub(super) delay_s: f64,
     /// Number of active joints.
     pub(super) active_joints: usize,
-    /// A motor has a table of its ripple.
+    /// Whether a motor has a ripple table.
     pub(super) has_ripple: bool,
-    /// A part of it is in proportion to the torque.
+    /// Whether a part of the ripple is proportional to the torque.
     pub(super) ripple_scales: bool,
-    /// The travel of a joint's reversals is known.
+    /// Whether the presliding travel of a joint is known.
     pub(super) has_presliding: bool,
-    /// The friction of a joint grows with its load.
+    /// Whether the friction of a joint grows with its load.
     pub(super) has_load_friction: bool,
-    /// A joint is compliant between encoder and link.
+    /// Whether a joint is compliant between encoder and link.
     pub(super) has_compliance: bool,
-    /// The estimator's gains after one period.
+    /// Gains of the estimator for one period.
     pub(super) one_period: EstimatorGains,
     encoder_step: EncoderStep,
     pub(super) torque_step_nm: Vector<N>,
-    /// Weights of squared external torques whose sum exceeds one where something pushes the arm \[1/(N m)^2\].
+    /// Weights of the squared external torques; the torques are large if the weighted sum exceeds one \[1/(N m)^2\].
     pub(super) large_torque_weight_per_nm2: Vector<N>,
-    /// Force of an unmodelled load times gravity \[N m/s^2\].
+    /// Minimum force of an unmodelled load times gravity \[N m/s^2\].
     load_n_m_per_s2: f64,
-    against: AgainstLimits<N>,
+    against: AgainstTorqueLimits<N>,
     pub(super) stop_step_nm: Vector<N>,
     pub(super) nullspace_damping_nm_s_per_rad: Vector<N>,
     pub(super) learned_bounds: LearnedBounds<N>,
@@ -107,7 +107,7 @@ impl<const N: usize> Controller<N> {
                 let gravity = config.arm.gravity();
                 config.plausible.load_n * sqrt(gravity.dot(&gravity))
             },
-            against: AgainstLimits::new(&config),
+            against: AgainstTorqueLimits::new(&config),
             stop_step_nm: Vector::from_fn(|i, _| {
                 let slow = config.limits.torque_rate_nm_per_s[i];
                 let fast = config.limits.joint_torque_nm[i] / STOP_TORQUE_S;
@@ -152,7 +152,7 @@ impl<const N: usize> Controller<N> {
         STOP_TIME_CONSTANT_DELAYS * self.delay_s
     }
 
-    /// The estimator's gains after so many periods. One, the common case, needs no exponential.
+    /// Gains of the estimator after this number of periods. The common case of one period needs no exponential.
     pub(super) fn estimator_gains(&self, periods: u64) -> EstimatorGains {
         match periods {
             1 => self.one_period,
@@ -163,19 +163,19 @@ impl<const N: usize> Controller<N> {
         }
     }
 
-    /// What the step of an encoder does to the estimates.
+    /// Effect of an encoder's resolution step on the estimates.
     pub(super) fn encoder_step(&self) -> &EncoderStep {
         &self.encoder_step
     }
 
-    /// Damping of each joint in the null space of the position task \[N m s/rad\]: that of the law, or as much
-    /// as the delay allows where the joint is light, as the last ones of a wrist are.
+    /// Damping of each joint in the null space of the position task \[N m s/rad\]: the damping of the law, or for light joints,
+    /// such as the last ones of a wrist, the maximum that the delay allows.
     pub fn nullspace_damping_nm_s_per_rad(&self) -> &Vector<N> {
         &self.nullspace_damping_nm_s_per_rad
     }
 
-    /// Maximum change of joint torque per cycle \[N m\]: by the rate limit, or with `stopping` the
-    /// larger of it and the rate of the safe action.
+    /// Maximum change of joint torque per cycle \[N m\]: from the rate limit, or with `stopping` from the
+    /// larger of the rate limit and the rate of the safe action.
     pub fn torque_step_nm(&self, stopping: bool) -> &Vector<N> {
         if stopping {
             &self.stop_step_nm
@@ -184,7 +184,7 @@ impl<const N: usize> Controller<N> {
         }
     }
 
-    /// What learning may change at most.
+    /// Bounds of the learned parameters.
     pub fn learned_bounds(&self) -> &LearnedBounds<N> {
         &self.learned_bounds
     }
@@ -205,11 +205,11 @@ impl<const N: usize> Controller<N> {
     }
 
     /// Limits of a motion against its torque.
-    pub(super) fn against_limits(&self) -> &AgainstLimits<N> {
+    pub(super) fn against_torque_limits(&self) -> &AgainstTorqueLimits<N> {
         &self.against
     }
 
-    /// What the encoders see.
+    /// Coupling between encoders and joints.
     pub(super) fn encoders(&self) -> &Encoders<N> {
         &self.encoders
     }

@@ -1,12 +1,12 @@
-//! Direction of the dry friction that the law feeds forward, where the travel of a reversal is known.
+//! Direction of the dry friction that the law feeds forward, for joints whose presliding travel is known.
 //!
-//! It follows the joints of the reference, see [`crate::friction`]. While the reference rests it fades, so that an arm at
-//! rest is left without friction feed-forward; in contact it stays as it is. Modes with stiff joint loops have no use for
-//! it.
+//! The direction follows the joint velocities of the reference, see [`crate::friction`]. While the reference rests, the
+//! direction fades, so that an arm at rest has no friction feed-forward; in contact it is frozen. Modes with stiff joint loops
+//! do not use it.
 //!
-//! The reference's joints are those of a tip that is at its reference. At the measured pose the same tip velocity takes
-//! others: at 5 N/m the tip is millimetres away, and a joint that the motion leaves alone would seem to move by some
-//! milliradians, over which its dry friction turns round.
+//! The joint velocities are computed for a tip at its reference. At the measured pose the same tip velocity gives others: at
+//! 5 N/m the tip is millimetres away from its reference, and a joint that does not move along the reference would seem to
+//! move by some milliradians, over which its dry friction reverses.
 
 use super::activity::Activity;
 use super::state::State;
@@ -16,17 +16,17 @@ use crate::law::impedance::Task;
 use crate::math::{Vector, Vector3, abs, exp, sqrt};
 use crate::trajectory::Reference;
 
-/// Share of the band below which a joint of the reference rests.
+/// Fraction of the friction model's velocity band below which the reference of a joint counts as resting.
 const REST_SHARE: f64 = 0.1;
 /// Time constant with which the direction fades at rest \[s\].
 const REST_S: f64 = 0.5;
-/// Distance of the tip from its reference up to which the Jacobian there is extrapolated \[m\].
+/// Maximum distance of the tip from its reference over which the Jacobian is extrapolated \[m\].
 const EXTRAPOLATED_M: f64 = 0.05;
 
 impl<const N: usize> State<N> {
-    /// Follows the reference for a cycle.
+    /// Updates the direction of the dry friction for one cycle of the reference.
     #[inline(never)]
-    pub(super) fn follow_presliding(
+    pub(super) fn update_dry_direction(
         &mut self,
         config: &Config<N>,
         tracking: Option<(&Task<N>, &Reference)>,
@@ -60,7 +60,7 @@ impl<const N: usize> State<N> {
     }
 }
 
-/// Joint velocities of the reference where the tip is at its reference, to first order in its distance \[rad/s\].
+/// Returns the joint velocities of the reference for a tip at its reference, to first order in the tip's distance \[rad/s\].
 fn velocity_at_reference<const N: usize>(
     terms: &Terms<N>,
     task: &Task<N>,
@@ -72,8 +72,8 @@ fn velocity_at_reference<const N: usize>(
         away *= EXTRAPOLATED_M / sqrt(square);
     }
     let (change, velocity) = (task.inverse * away, task.inverse * reference.velocity);
-    // A joint turns the lever arms of all joints from itself on: column j of the Jacobian changes by its cross product
-    // with the axes of the joints up to j, or with the axis of j for a joint beyond.
+    // The motion of joint i changes column j of the Jacobian by the cross product of that column with the axis of i if i <= j,
+    // and with the axis of j otherwise.
     let (mut turned, mut turning) = (Vector3::zeros(), Vector3::zeros());
     let mut bias = Vector3::zeros();
     for j in 0..N {

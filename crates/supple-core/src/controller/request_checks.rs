@@ -1,4 +1,5 @@
-//! Checks of the values of a request that fit into one cycle; [`super::check_motion()`] checks a motion over its whole length.
+//! Checks of a request that are fast enough for the control loop; [`super::check_motion()`] checks a motion over its whole
+//! length.
 
 use super::mode::{Breakaway, Refusal};
 use super::pose_gains::{GainMatrices, GainPart};
@@ -13,7 +14,7 @@ use crate::trajectory::{
     Rotation, Trajectory,
 };
 
-/// Angle by which the target of a held joint may differ from its own \[rad\].
+/// Maximum difference between the target of a held joint and the angle at which it is held \[rad\].
 const HELD_TOLERANCE_RAD: f64 = 1e-6;
 /// Maximum distance of a joint from the start of an excitation \[rad\].
 const EXCITE_START_RAD: f64 = 0.02;
@@ -165,7 +166,7 @@ pub(super) fn check_gain_matrices<const N: usize>(
     check_ramp(ramp_s)
 }
 
-/// The pose has six directions.
+/// Checks that enough joints are active for the six directions of a pose.
 pub(super) fn check_pose_joints<const N: usize>(config: &Config<N>) -> Result<(), Refusal> {
     let active = count_active(&config.roles);
     if active >= DIRECTIONS {
@@ -296,8 +297,8 @@ pub(super) fn check_breakaway<const N: usize>(
     Ok(())
 }
 
-/// The target with the held joints where they are.
-pub(super) fn active_target<const N: usize>(
+/// Returns the target with the angles of `from_rad` for the held joints.
+pub(super) fn target_with_held_joints<const N: usize>(
     config: &Config<N>,
     from_rad: &Vector<N>,
     target_rad: &Vector<N>,
@@ -326,7 +327,7 @@ pub(super) fn check_held_targets<const N: usize>(
     Ok(())
 }
 
-pub(super) fn check_stops<const N: usize>(
+pub(super) fn check_position_limits<const N: usize>(
     config: &Config<N>,
     target_rad: &Vector<N>,
 ) -> Result<(), Refusal> {
@@ -344,8 +345,9 @@ pub(super) fn check_stops<const N: usize>(
     Ok(())
 }
 
-/// `speed_share` of the joints' speed limits applies.
-pub(super) fn check_line<const N: usize>(
+/// Checks the peak speed, acceleration and jerk of a minimum-jerk move. `speed_share` is the fraction of the joints' speed
+/// limits that applies.
+pub(super) fn check_joint_move<const N: usize>(
     config: &Config<N>,
     speed_share: f64,
     from_rad: &Vector<N>,

@@ -7,9 +7,9 @@ use super::fault::SafeAction;
 use super::mode::{Mode, Refusal, Request};
 use super::pose_gains::{GainAxes, GainMatrices, GainPart, in_base};
 use super::request_checks::{
-    active_target, check_breakaway, check_excitation, check_gain_matrices, check_gains,
-    check_held_targets, check_joint_gains, check_line, check_peak, check_pose_joints,
-    check_rotation, check_rotational_gains, check_stops,
+    check_breakaway, check_excitation, check_gain_matrices, check_gains, check_held_targets,
+    check_joint_gains, check_joint_move, check_peak, check_pose_joints, check_position_limits,
+    check_rotation, check_rotational_gains, target_with_held_joints,
 };
 use super::state::State;
 use crate::config::Config;
@@ -17,14 +17,14 @@ use crate::law::impedance::Task;
 use crate::math::{abs, sqrt};
 use crate::trajectory::Trajectory;
 
-/// Fraction of a joint's speed limit up to which an arm that falls or sinks with idle drives may be held again: more than
-/// shorted motors let it sink with.
+/// Fraction of a joint's speed limit up to which gravity hold may start while the arm sinks with idle drives. Shorted motors
+/// let the arm sink at a lower speed.
 const ENTRY_SPEED_SHARE: f64 = 0.25;
 /// Fraction of a joint's speed limit up to which an arm counts as stopped at a reset.
 const RESET_SPEED_SHARE: f64 = 0.05;
 
 impl<const N: usize> State<N> {
-    /// Carries out a request, or returns why it is refused.
+    /// Carries out a request, or returns the reason for its refusal.
     #[inline(never)]
     pub(super) fn request(
         &mut self,
@@ -58,7 +58,7 @@ impl<const N: usize> State<N> {
                 let matrices =
                     GainMatrices::diagonal(&gains.stiffness_n_per_m, &gains.damping_n_s_per_m);
                 let enforced = mode == Mode::TrackPose;
-                self.change_matrices(
+                self.start_gain_matrix_ramp(
                     controller,
                     GainPart::Linear,
                     &matrices,
@@ -79,7 +79,7 @@ impl<const N: usize> State<N> {
                     &gains.stiffness_nm_per_rad,
                     &gains.damping_nm_s_per_rad,
                 );
-                self.change_matrices(
+                self.start_gain_matrix_ramp(
                     controller,
                     GainPart::Rotational,
                     &matrices,
@@ -96,14 +96,14 @@ impl<const N: usize> State<N> {
             } => {
                 check_pose_joints(config)?;
                 check_gain_matrices(config, part, &gains, ramp_s)?;
-                self.change_matrices(controller, part, &gains, axes, ramp_s, true)?;
+                self.start_gain_matrix_ramp(controller, part, &gains, axes, ramp_s, true)?;
             }
             Request::Learning(switch) => self.switch_learning(config, switch),
             Request::LearnedParameters(ref parameters) => {
-                self.receive_learned(controller, parameters)?;
+                self.apply_learned_parameters(controller, parameters)?;
             }
             Request::LearnedMap { joint, ref map } => {
-                self.receive_learned_map(controller, joint, map)?;
+                self.apply_learned_map(controller, joint, map)?;
             }
             // Idle is allowed in a fault without a reset; the fault stays latched.
             Request::Idle if mode == Mode::Fault => self.enter(Activity::Fault(SafeAction::Brake)),
@@ -121,12 +121,12 @@ impl<const N: usize> State<N> {
                 target_rad,
                 duration_s,
             } => {
-                check_stops(config, &target_rad)?;
+                check_position_limits(config, &target_rad)?;
                 check_held_targets(config, &target_rad)?;
-                // Where gravity hold keeps the pose, the loops go on from their set-points.
+                // If gravity hold keeps the pose, the position loops continue from their set-points.
                 let held_rad = self.pose_to_hold_rad(controller);
                 let from_rad = held_rad.unwrap_or(self.position);
-                check_line(config, 1.0, &from_rad, &target_rad, duration_s)?;
+                check_joint_move(config, 1.0, &from_rad, &target_rad, duration_s)?;
                 self.enter(Activity::Move {
                     from_rad,
                     to_rad: target_rad,
@@ -138,7 +138,7 @@ impl<const N: usize> State<N> {
                 self.enter(Activity::Track(trajectory));
             }
             Request::SetPoint(ref set_point) => {
-                self.receive_set_point(controller, set_point)?;
+                self.apply_set_point(controller, set_point)?;
             }
             Request::TrackPose {
                 trajectory,
@@ -150,10 +150,13 @@ impl<const N: usize> State<N> {
                 let base_from_tip = &self.terms.base_from_tip.rotation;
                 self.check_pose_damping(
                     controller,
-                    &self.pose_gains.linear.damping_at_ends(base_from_tip),
-                    &self.pose_gains.rotational.damping_at_ends(base_from_tip),
+                    &self.pose_gains.linear.damping_at_ramp_ends(base_from_tip),
+                    &self
+                        .pose_gains
+                        .rotational
+                        .damping_at_ramp_ends(base_from_tip),
                 )?;
-                self.check_regular(config)?;
+                self.check_pose_is_regular(config)?;
                 self.enter(Activity::TrackPose {
                     trajectory,
                     rotation,
@@ -170,9 +173,9 @@ impl<const N: usize> State<N> {
                 duration_s,
             } => {
                 self.check_compliant_speed(config)?;
-                let target_rad = active_target(config, &self.position, &target_rad);
-                check_stops(config, &target_rad)?;
-                check_line(
+                let target_rad = target_with_held_joints(config, &self.position, &target_rad);
+                check_position_limits(config, &target_rad)?;
+                check_joint_move(
                     config,
                     COMPLIANT_SPEED_SHARE,
                     &self.position,
@@ -187,7 +190,7 @@ impl<const N: usize> State<N> {
                 });
             }
             Request::Excite(series) => {
-                // A joint that friction or gravity keeps from its set-point goes on from there.
+                // If position loops are active, the excitation continues from their set-points.
                 let held_rad = self.loop_setpoints_rad(config);
                 let from_rad = held_rad.unwrap_or(self.position);
                 check_excitation(config, &from_rad, &series)?;
@@ -202,9 +205,9 @@ impl<const N: usize> State<N> {
         Ok(())
     }
 
-    /// Starts a ramp of gain matrices; with `check_delay` unless the delay of the loop forbids their damping in this pose.
+    /// Starts a ramp of gain matrices. With `check_delay` it refuses damping that the loop's delay does not allow in this pose.
     #[inline(never)]
-    fn change_matrices(
+    fn start_gain_matrix_ramp(
         &mut self,
         controller: &Controller<N>,
         part: GainPart,
@@ -219,11 +222,11 @@ impl<const N: usize> State<N> {
             let ramps = &self.pose_gains;
             match part {
                 GainPart::Linear => {
-                    let rotational = ramps.rotational.damping_at_ends(&base_from_tip);
+                    let rotational = ramps.rotational.damping_at_ramp_ends(&base_from_tip);
                     self.check_pose_damping(controller, &new, &rotational)?;
                 }
                 GainPart::Rotational => {
-                    let linear = ramps.linear.damping_at_ends(&base_from_tip);
+                    let linear = ramps.linear.damping_at_ramp_ends(&base_from_tip);
                     self.check_pose_damping(controller, &linear, &new)?;
                 }
             }
@@ -233,7 +236,7 @@ impl<const N: usize> State<N> {
         Ok(())
     }
 
-    /// Refuses a compliant mode while the arm is faster than it may be there: its first cycle would be a fault.
+    /// Refuses a compliant mode while the arm exceeds that mode's speed limits: the first cycle would raise a fault.
     fn check_compliant_speed(&self, config: &Config<N>) -> Result<(), Refusal> {
         self.check_speed(config, COMPLIANT_SPEED_SHARE)?;
         let tip = self.terms.jacobian.fixed_rows::<3>(0) * self.estimator.velocity_rad_per_s;
@@ -269,7 +272,8 @@ impl<const N: usize> State<N> {
         Ok(())
     }
 
-    /// Refuses a ramp while the set-points of the joints still move: the torque of a moving joint does not hold it.
+    /// Refuses a breakaway ramp while the set-points of the joints move. The ramp starts from the torque that holds the
+    /// joint, and the torque of a moving joint is not that torque.
     fn check_reference_at_rest(&self, config: &Config<N>) -> Result<(), Refusal> {
         let speed_rad_per_s = match self.activity.has_joint_loops() {
             true => self
@@ -311,9 +315,9 @@ impl<const N: usize> State<N> {
         Ok(())
     }
 
-    /// Refuses a pose near a singular one, where the task of six directions is damped.
+    /// Refuses track pose near a singular pose, in which the task in six directions is damped.
     #[inline(never)]
-    fn check_regular(&self, config: &Config<N>) -> Result<(), Refusal> {
+    fn check_pose_is_regular(&self, config: &Config<N>) -> Result<(), Refusal> {
         match Task::of_pose(&self.terms, &config.roles) {
             Some(task) if !task.is_damped => Ok(()),
             _ => Err(Refusal::Singular),

@@ -1,16 +1,16 @@
 //! Scale of the observed force in free motion: sets the contact threshold at a constant false-alarm rate.
 //!
-//! In free motion all of the observed force is residual: noise of the encoders and error of the model in
-//! use. `x` is that force over the threshold as configured. Its root mean square `s` follows the last
+//! In free motion the whole observed force is residual: noise of the encoders and error of the model in
+//! use. `x` is that force divided by the configured threshold, and `s` its root mean square over the last
 //! seconds; contact is a force above the configured threshold times `z s`, with
 //!
 //! ```text
 //! z = sqrt(2 ln(n0 / n))
 //! ```
 //!
-//! which a Gaussian residual crosses upwards `n` times per second if it crosses zero `n0` times (Rice,
+//! which a Gaussian residual exceeds `n` times per second if it crosses zero upwards `n0` times per second (Rice,
 //! 1945). `n0` is bounded by the bandwidth of the velocity estimate, `omega / (2 pi)`. Until residuals
-//! are known, and without a stated rate, the factor is one.
+//! are known, and without a configured false-alarm rate, the factor is one.
 
 use crate::math::{log, sqrt};
 
@@ -18,9 +18,9 @@ use crate::math::{log, sqrt};
 const HOUR_S: f64 = 3600.0;
 /// Time over which the mean square is taken \[s\].
 const WINDOW_S: f64 = 5.0;
-/// Weight of the first assumption, `z s = 1` \[s\].
+/// Weight of the initial value, `z s = 1`, as a time \[s\].
 const PRIOR_S: f64 = 0.1;
-/// Residuals count up to this multiple of their scale, so that a contact that is about to be detected does
+/// Residuals are clipped at this multiple of their scale, so that a contact that is about to be detected does
 /// not raise the threshold.
 const CLIP: f64 = 3.0;
 /// Range of the factor: residuals only raise the configured threshold, and may not hide every force.
@@ -29,15 +29,15 @@ const FACTOR: (f64, f64) = (1.0, 5.0);
 /// Mean square of the residual.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ResidualScale {
-    /// `z`; zero without a stated rate.
+    /// `z`; zero without a configured false-alarm rate.
     deviations: f64,
     /// `(z s)^2`.
     mean_square: f64,
-    seen_s: f64,
+    observed_s: f64,
 }
 
 impl ResidualScale {
-    /// For a rate of false alarms \[1/h\] and a bandwidth of the velocity estimate \[rad/s\].
+    /// Creates the scale for a false-alarm rate \[1/h\] and a bandwidth of the velocity estimate \[rad/s\].
     pub fn new(false_alarms_per_hour: f64, estimator_rad_per_s: f64) -> ResidualScale {
         let crossings_per_hour = HOUR_S * estimator_rad_per_s / core::f64::consts::TAU;
         let deviations = if false_alarms_per_hour < crossings_per_hour {
@@ -48,15 +48,15 @@ impl ResidualScale {
         ResidualScale {
             deviations,
             mean_square: 1.0,
-            seen_s: 0.0,
+            observed_s: 0.0,
         }
     }
 
     /// Adds a residual `x` of a cycle without contact.
     #[inline]
     pub fn add(&mut self, x: f64, elapsed_s: f64) {
-        let window_s = (self.seen_s + PRIOR_S).min(WINDOW_S);
-        self.seen_s += elapsed_s;
+        let window_s = (self.observed_s + PRIOR_S).min(WINDOW_S);
+        self.observed_s += elapsed_s;
         let square = (self.deviations * x) * (self.deviations * x);
         let clip = CLIP * CLIP * self.mean_square;
         let change = (square.min(clip) - self.mean_square) * (elapsed_s / window_s).min(1.0);

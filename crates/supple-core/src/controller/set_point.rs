@@ -1,8 +1,8 @@
-//! Set-points of the tip that come one after another, at any rate up to one per cycle.
+//! Streams of set-points of the tip, at any rate up to one per cycle.
 //!
-//! Each carries the cycle at which the reference is to pass it, so that the times at which they arrive do not matter. The
-//! reference goes there from its present position, velocity and acceleration along a quintic polynomial, and comes to rest
-//! behind it: silence ends in a held position. A newer set-point replaces the rest of the way.
+//! Each set-point carries the cycle in which the reference passes it, so that jitter of its arrival has no effect. The
+//! reference moves from its present position, velocity and acceleration to the set-point along a quintic polynomial, and then
+//! comes to rest: if no further set-point arrives, the tip is held. A newer set-point replaces the remaining motion.
 
 use super::Controller;
 use super::activity::Activity;
@@ -16,7 +16,7 @@ use crate::trajectory::{Reference, Segment, Trajectory, TrajectoryError};
 pub const MAX_SET_POINT_AHEAD_S: f64 = 1.0;
 
 impl SetPoint {
-    /// The reference there.
+    /// Reference of the tip at the set-point.
     pub(super) fn reference(&self) -> Reference {
         Reference {
             position: self.position_m,
@@ -46,11 +46,11 @@ impl SetPoint {
 }
 
 impl<const N: usize> State<N> {
-    /// Continues the reference to a set-point, or returns why not. The tip must already be held by the impedance law:
-    /// by a track request of a hold, or by earlier set-points. So set-points that are still under way do not restart a
-    /// motion that somebody else has ended by another mode; a hold is continued.
+    /// Continues the reference to a set-point, or returns the reason for a refusal. The impedance law must already hold the tip,
+    /// by a track request of a hold or by earlier set-points. Set-points that arrive late thus cannot restart a motion that
+    /// another client has ended with another mode.
     #[inline(never)]
-    pub(super) fn receive_set_point(
+    pub(super) fn apply_set_point(
         &mut self,
         controller: &Controller<N>,
         set_point: &SetPoint,
@@ -76,7 +76,7 @@ impl<const N: usize> State<N> {
     }
 }
 
-/// Time from this cycle to that of the set-point \[s\].
+/// Returns the time from this cycle to the cycle of the set-point \[s\], or refuses a time that is negative or too long.
 fn check_time<const N: usize>(
     config: &Config<N>,
     cycle: u64,

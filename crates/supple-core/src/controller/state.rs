@@ -37,13 +37,13 @@ pub struct State<const N: usize> {
     pub(super) activity_start: u64,
     /// Cycle number of the last arm state; `None` before the first.
     pub(super) cycle: Option<u64>,
-    /// Cycles since then without a new state.
+    /// Cycles since then in which no new state arrived.
     pub(super) stale: u32,
     /// Consecutive lost replies of each encoder.
     pub(super) missing: [u32; N],
     /// Angles of the links: those of the encoders less the elastic deflection.
     pub(super) position: Vector<N>,
-    /// What the compliance of the joints makes of gravity \[rad\].
+    /// Deflection of the joints' compliance under gravity \[rad\].
     pub(super) elastic_deflection_rad: Vector<N>,
     pub(super) estimator: Estimator<N>,
     pub(super) observer: MomentumObserver<N>,
@@ -52,7 +52,7 @@ pub struct State<const N: usize> {
     pub(super) contact_velocity_rad_per_s: Vector<N>,
     /// Friction of the joints under their present load.
     pub(super) friction: [Friction; N],
-    /// Direction of the dry friction to feed forward; `None`: that of the velocity.
+    /// Direction of the dry friction to feed forward; `None`: the direction of the velocity.
     pub(super) dry_direction: Option<Vector<N>>,
     pub(super) gains: GainRamp<Gains>,
     pub(super) joint_gains: GainRamp<JointGains<N>>,
@@ -64,19 +64,20 @@ pub struct State<const N: usize> {
     hold_pose: bool,
     /// Whether there are position loops outside the modes that move joints.
     pub(super) has_held_loops: bool,
-    /// Last torque and fallback torque sent.
+    /// Last torque sent \[N m\].
     pub(super) torque: Vector<N>,
     /// Part of the last torque that cancels the ripple of the motors, and so does not reach the links \[N m\].
     pub(super) ripple: Vector<N>,
+    /// Last fallback torque sent \[N m\].
     pub(super) fallback: Vector<N>,
     pub(super) handover: Handover<N>,
     pub(super) fault: Option<Fault>,
     pub(super) terms: Terms<N>,
-    /// The motors apply torques.
+    /// Whether the motors apply torques.
     pub(super) drives_active: bool,
     /// Cycle in which the drives became active last.
     activated_cycle: u64,
-    /// First and last cycle of those in a row in which a collision threshold was exceeded.
+    /// First and last of consecutive cycles in which a collision threshold was exceeded.
     pub(super) exceeded_cycles: (u64, u64),
     pub(super) plausibility: Plausibility<N>,
     pub(super) stuck_encoders: StuckEncoders<N>,
@@ -86,7 +87,7 @@ pub struct State<const N: usize> {
     pub(super) stopping_motion: StoppingMotion<N>,
     /// Time for which large external torques have acted while the arm follows a reference \[s\].
     pub(super) large_torque_s: f64,
-    /// What is learned of the model.
+    /// Learned parameters of the model.
     pub(super) learned: Learned<N>,
 }
 
@@ -153,7 +154,7 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Receives a state. Returns the time since the last one \[s\]; zero if it is a repetition.
+    /// Receives an arm state. Returns the time since the last one \[s\]; zero if it is a repetition.
     pub(super) fn receive(
         &mut self,
         controller: &Controller<N>,
@@ -163,7 +164,7 @@ impl<const N: usize> State<N> {
         let limit = config.limits.stale_cycles;
         let out_of_order = match self.cycle {
             Some(last) if input.cycle < last => {
-                // The plant was restarted: reinitialise from its state, but report a fault. The activity goes on.
+                // The plant was restarted: reinitialise from its state, but report a fault. The activity continues.
                 let activity_cycles = last.wrapping_sub(self.activity_start);
                 self.activity_start = input.cycle.wrapping_sub(activity_cycles);
                 self.cycle = None;
@@ -189,7 +190,7 @@ impl<const N: usize> State<N> {
         let elapsed_s = gains.elapsed_s();
         self.receive_positions(controller, &input.position_rad, &gains)?;
         if controller.has_compliance() {
-            self.subtract_sag(config);
+            self.subtract_elastic_deflection(config);
         }
         self.cycle = Some(input.cycle);
         self.stale = 0;
@@ -225,11 +226,11 @@ impl<const N: usize> State<N> {
         if all && all_finite(&q) {
             self.missing = [0; N];
         } else {
-            self.miss(measured_rad, if first { 0 } else { 1 })?;
+            self.count_missing_replies(measured_rad, if first { 0 } else { 1 })?;
         }
         let plausible = &config.plausible;
         self.plausibility
-            .receive_replies(plausible, measured_rad, all)?;
+            .check_replies(plausible, measured_rad, all)?;
         self.stuck_encoders.receive(controller.encoders(), &q);
         if first {
             self.position = q;
@@ -264,7 +265,11 @@ impl<const N: usize> State<N> {
 
     /// Counts missing positions, and rejects one that is not finite or has been missing for more than the tolerated cycles.
     #[inline(never)]
-    fn miss(&mut self, measured_rad: &[Option<f64>; N], tolerated: u32) -> Result<(), Fault> {
+    fn count_missing_replies(
+        &mut self,
+        measured_rad: &[Option<f64>; N],
+        tolerated: u32,
+    ) -> Result<(), Fault> {
         for (joint, position) in measured_rad.iter().enumerate() {
             match position {
                 Some(position) if position.is_finite() => self.missing[joint] = 0,
@@ -278,16 +283,16 @@ impl<const N: usize> State<N> {
         Ok(())
     }
 
-    /// From the encoders' angles to those of the links, with gravity at the last angles.
+    /// Subtracts the elastic deflection under gravity at the last angles, which gives the angles of the links.
     #[inline(never)]
-    fn subtract_sag(&mut self, config: &Config<N>) {
+    fn subtract_elastic_deflection(&mut self, config: &Config<N>) {
         self.elastic_deflection_rad = config
             .compliance_rad_per_nm
             .component_mul(&self.terms.gravity);
         self.position -= self.elastic_deflection_rad;
     }
 
-    /// The friction of each joint while its gear carries gravity, which is nearly all of its load in slow motion.
+    /// Updates the friction of each joint for the gravity load on its gear, which is nearly all of the load in slow motion.
     #[inline(never)]
     pub(super) fn update_friction(&mut self, config: &Config<N>) {
         for (i, friction) in config.friction.iter().enumerate() {
@@ -319,8 +324,8 @@ impl<const N: usize> State<N> {
 
     /// Starts an activity; the present torque, if any, will be blended out.
     pub(super) fn enter(&mut self, activity: Activity<N>) {
-        let loops_go_on = self.hold_pose && self.activity.has_joint_loops();
-        if self.held_loops_inactive() && !loops_go_on {
+        let loops_continue = self.hold_pose && self.activity.has_joint_loops();
+        if self.held_loops_inactive() && !loops_continue {
             self.held_setpoint_rad = self.position;
         }
         let has_torque = !self.activity.is_torque_off() && !activity.is_torque_off();
@@ -342,17 +347,17 @@ impl<const N: usize> State<N> {
         self.large_torque_s = 0.0;
     }
 
-    /// While the drives are idle, every activity with torque is replaced by gravity hold; when they
+    /// Replaces every activity with torque by gravity hold while the drives are idle; when they
     /// become active again, gravity hold restarts from the gravity torque alone.
     pub(super) fn update_drives(&mut self, active: bool) {
-        let came_back = active && !self.drives_active;
+        let reactivated = active && !self.drives_active;
         self.drives_active = active;
-        if came_back {
+        if reactivated {
             self.activated_cycle = self.cycle.unwrap_or(0);
         }
         match self.activity {
             Activity::Idle | Activity::Fault(_) => {}
-            Activity::GravityHold if !came_back => {}
+            Activity::GravityHold if !reactivated => {}
             Activity::GravityHold => self.enter(Activity::GravityHold),
             _ if !active => self.enter(Activity::GravityHold),
             _ => {}
@@ -374,7 +379,7 @@ impl<const N: usize> State<N> {
             .map_or(0, |cycle| cycle.wrapping_sub(self.activity_start))
     }
 
-    /// Whether the drives became active within this time \[s\].
+    /// Returns whether the drives became active within this time \[s\].
     pub(super) fn activated_within(&self, config: &Config<N>, time_s: f64) -> bool {
         let cycles = self
             .cycle
@@ -382,20 +387,20 @@ impl<const N: usize> State<N> {
         cycles as f64 * config.period_s < time_s
     }
 
-    /// Whether the last state is older than tolerated: then only gravity may still be computed from
+    /// Returns whether the last state is older than tolerated, so that only gravity may still be computed from
     /// it.
     pub(super) fn is_stale(&self, config: &Config<N>) -> bool {
         self.stale > config.limits.stale_cycles
     }
 
-    /// Whether the position loops of held joints are off.
+    /// Returns whether the position loops of held joints are off.
     fn held_loops_inactive(&self) -> bool {
         let in_fault = matches!(self.activity, Activity::Fault(_));
         let has_own = self.activity.has_joint_loops();
         !self.drives_active || self.activity.is_torque_off() || has_own || in_fault
     }
 
-    /// Whether position loops keep every joint in gravity hold.
+    /// Returns whether position loops keep every joint in gravity hold.
     pub(super) fn holds_pose(&self) -> bool {
         let holding = matches!(self.activity, Activity::GravityHold);
         self.hold_pose && self.drives_active && holding
@@ -403,7 +408,7 @@ impl<const N: usize> State<N> {
 
     /// Moves the set-points of held joints towards their configured angles at a limited speed.
     /// While the loops are off, the set-points follow the joints, so that the loops engage without
-    /// a jump. Where gravity hold keeps the pose, they follow the loops of the other modes.
+    /// a jump. If gravity hold keeps the pose, the set-points follow those of the other modes' loops.
     pub(super) fn update_held_setpoints(&mut self, controller: &Controller<N>, elapsed_s: f64) {
         if !self.has_held_loops {
             return;

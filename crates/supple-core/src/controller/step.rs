@@ -95,7 +95,7 @@ pub fn step<const N: usize>(
     state.supervise_stop(controller, &tip_velocity, elapsed_s);
     if controller.has_presliding() {
         let tracking = task.as_ref().zip(reference.as_ref());
-        state.follow_presliding(config, tracking, pose.is_some(), elapsed_s);
+        state.update_dry_direction(config, tracking, pose.is_some(), elapsed_s);
     }
 
     let mut torques = state.activity_torques(
@@ -108,7 +108,7 @@ pub fn step<const N: usize>(
     if !(state.activity.is_torque_off() || state.fault.is_some() || state.is_stale(config)) {
         state.add_joint_loops_and_stops(controller, &mut torques);
         if controller.has_ripple() {
-            // Torque constants vary slowly over a cycle: the last torque is near enough.
+            // The torque changes little within a cycle, so the last torque is accurate enough.
             let motor_nm = match controller.ripple_scales() {
                 true => config.joint_from_motor.tr_mul(&state.torque),
                 false => Vector::zeros(),
@@ -187,7 +187,7 @@ pub fn step<const N: usize>(
 }
 
 impl<const N: usize> State<N> {
-    /// Latches the fault of torques that are not finite and replaces them by those of the safe action; returns their sum.
+    /// Latches the fault of torques that are not finite, replaces them by the torques of the safe action, and returns their sum.
     #[cold]
     #[inline(never)]
     fn replace_torques(

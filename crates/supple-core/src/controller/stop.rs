@@ -5,7 +5,7 @@
 //! ```
 //!
 //! with the gravity compensation `G`, the generalised momentum `p`, and a scale `k` that keeps the torque limits. A joint whose gravity
-//! compensation alone exceeds its limit does not reduce `k`; its torque is limited alone.
+//! compensation alone exceeds its limit does not reduce `k`; only the torque of that joint is limited.
 //!
 //! **It cannot excite the arm.** Its power `-k qd^T H qd / t_stop` takes energy from any motion, as Coriolis torques have
 //! zero power; if a joint or motor limit applies, `k` scales all joints alike, so that this remains true. Without delay every
@@ -20,9 +20,10 @@
 //! encoder, a defective motor or a wrong model. The arm *moves* if a joint or the tip is faster than a fifth of its speed limit;
 //! external torques are *large* if the norm of `tau_i / limit_i` over the joints exceeds a twentieth. The drives brake
 //!
-//! 1. if the fault is one of motion and, at the fault or within the delay of the loop after it, the external torques look like
-//!    those of a missing or reversed gravity compensation, see `resembles_gravity_failure`. Dead motors, reversed motors and gravity
-//!    of the wrong sign cause them. Excluded are an obstacle, which takes power from the arm, and an impact, which causes larger torques;
+//! 1. if a motion fault occurs (see `is_of_motion`) and, at the fault or within the loop's delay after it, the external torques
+//!    match those of a missing or reversed gravity compensation, see `resembles_gravity_failure`. Dead motors, reversed motors
+//!    and gravity of the wrong sign cause them. An obstacle takes power from the arm, and an impact causes larger torques;
+//!    neither matches;
 //! 2. if the arm moves and its kinetic energy exceeds 1.2 times its recent peak (decaying within 0.2 s, and including the first
 //!    averaging window after the fault), see `stopping_motion.rs`;
 //! 3. if the arm still moves 0.2 s after the fault;
@@ -48,22 +49,23 @@ pub(crate) const STOP_TIMEOUT_S: f64 = 0.2;
 const RESIDUAL_TORQUE_SHARE: f64 = 0.1;
 /// Time for which such a torque may act \[s\].
 const RESIDUAL_TORQUE_S: f64 = 0.05;
-/// Time for which large external torques act before a speed limit is exceeded, where the drives brake at once \[s\].
+/// Time for which large external torques must have acted before a speed limit is exceeded, so that the drives brake at once
+/// \[s\].
 const LARGE_TORQUE_S: f64 = 0.05;
 /// Time after which an impact and the observer's response to it have decayed \[s\].
 const IMPACT_S: f64 = 0.15;
-/// Ratio of the estimated inertial torque to the largest that reversed motors can cause, above which an impact is assumed. Greater
-/// than one, because a motor that drives through an elastic cable accelerates against its rotor's inertia alone.
+/// Ratio of the estimated inertial torque to the largest that reversed motors can cause, above which an impact is assumed.
+/// Greater than one, because a motor that drives through an elastic cable accelerates against its rotor's inertia alone.
 const IMPACT_RATIO: f64 = 4.0;
-/// Minimum power of the external torques where gravity compensation fails, as a fraction of what they would have with every joint at
-/// its speed limit in their direction.
+/// Minimum power of the external torques if gravity compensation fails, as a fraction of their power with every joint at its
+/// speed limit in their direction.
 const MIN_SPEED_FRACTION: f64 = 0.05;
-/// Maximum ratio of the external torque to the gravity compensation if that is missing or reversed: two for a reversed one, and
-/// one for the torque that a position loop adds.
+/// Maximum ratio of the external torque to the gravity compensation if the compensation is missing or reversed: two for a
+/// reversed one, plus one for the torque that a position loop adds.
 const MAX_GRAVITY_RATIO: f64 = 3.0;
 /// Minimum of this ratio.
 const MIN_GRAVITY_RATIO: f64 = 1.1;
-/// Minimum of this ratio where a hand may guide the arm.
+/// Minimum of this ratio in modes in which a hand may guide the arm.
 const MIN_GRAVITY_RATIO_GUIDED: f64 = 1.4;
 /// Decay time of the peak kinetic energy \[s\].
 const ENERGY_PEAK_DECAY_S: f64 = 0.2;
@@ -137,9 +139,9 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// The safe action of a fault. The drives brake at once if gravity compensation has failed, or if a speed limit was exceeded
-    /// after large external torques had acted while the arm followed a reference out of contact: a dead motor causes such
-    /// torques, and damping by the other motors could accelerate the arm.
+    /// Returns the safe action of a fault. The drives brake at once if gravity compensation has failed, or if a speed limit was
+    /// exceeded after large external torques had acted while the arm followed a reference out of contact: a dead motor causes
+    /// such torques, and damping by the other motors could accelerate the arm.
     pub(super) fn action_of(&self, controller: &Controller<N>, fault: &Fault) -> SafeAction {
         let too_fast = matches!(fault, Fault::JointSpeed { .. } | Fault::TipSpeed { .. });
         if self.activity.is_torque_off()
@@ -153,7 +155,7 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Whether the arm follows a reference out of contact, so that nobody is expected to move it.
+    /// Returns whether the arm follows a reference out of contact, so that nobody is expected to move it.
     pub(super) fn follows_reference(&self) -> bool {
         let may_be_led = matches!(
             self.activity,
@@ -162,14 +164,14 @@ impl<const N: usize> State<N> {
         !(may_be_led || self.latch.in_contact())
     }
 
-    /// Whether the external torques are large.
+    /// Returns whether the external torques are large.
     fn has_large_external_torque(&self, controller: &Controller<N>) -> bool {
         let external_nm = self.observer.external_torque_nm();
         let squares = external_nm.component_mul(&external_nm);
         squares.dot(&controller.large_torque_weight_per_nm2) > 1.0
     }
 
-    /// Whether the external torques look like those of a missing or reversed gravity compensation:
+    /// Returns whether the external torques match those of a missing or reversed gravity compensation:
     ///
     /// - they are large, their power is positive, and the arm accelerates;
     /// - at every joint where they are large, their ratio to the gravity compensation is within the limits, with the same sign
@@ -217,7 +219,7 @@ impl<const N: usize> State<N> {
         any_multiple && all_consistent
     }
 
-    /// Whether an external torque acts that should move the arm: on a joint with an unchanged
+    /// Returns whether an external torque acts that should move the arm: on a joint with an unchanged
     /// encoder, or on any joint after an impact has decayed.
     fn has_residual_torque(&self, controller: &Controller<N>) -> bool {
         let (config, encoders) = (controller.config(), controller.encoders());
@@ -233,7 +235,7 @@ impl<const N: usize> State<N> {
     }
 }
 
-/// Whether the fault reports an abnormal motion: a limit of position, speed, workspace or tracking, or a collision.
+/// Returns whether the fault reports an abnormal motion: a limit of position, speed, workspace or tracking, or a collision.
 fn is_of_motion(fault: &Fault) -> bool {
     matches!(
         fault,

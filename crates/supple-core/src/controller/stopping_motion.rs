@@ -1,32 +1,33 @@
-//! Motion of a stopping arm: whether it gathers energy.
+//! Motion of a stopping arm: detects whether the arm gains kinetic energy.
 
 use super::checks::MOVING_SHARE;
 use crate::config::{Config, Limits};
 use crate::dynamics::Terms;
 use crate::math::{Vector, Vector3, abs};
 
-/// Greatest number of cycles over which the speed of a stopping arm is averaged.
+/// Maximum number of cycles over which the speed of a stopping arm is averaged.
 const MAX_WINDOW: usize = 16;
 /// Ratio to the kinetic energy at the fault and before above which the arm counts as accelerating.
 const ENERGY_GROWTH_LIMIT: f64 = 1.2;
 
-/// Motion of a stopping arm, from its angles alone. The velocity estimate needs several times the lag of its filter until it
-/// shows the speed of an arm that somebody has struck; the mean over half of the lag, `1 / w`, is exact after that time.
+/// Motion of a stopping arm, from its angles alone. After an impact the velocity estimate needs several times the lag of its
+/// filter to reach the arm's speed; the mean over half of the lag, `1 / w`, is exact after that time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StoppingMotion<const N: usize> {
-    /// Angles of the last cycles \[rad\] and their times since the fault \[s\], the latest at `count - 1`, modulo the length.
+    /// Ring buffer of the last angles \[rad\] and their times since the fault \[s\]; the latest is at `count - 1` modulo the
+    /// length.
     angles: [(Vector<N>, f64); MAX_WINDOW],
     count: usize,
-    /// Greatest kinetic energy before the fault, and over the first window \[J\].
+    /// Maximum kinetic energy before the fault and over the first window \[J\].
     allowed_j: f64,
-    /// Whether nobody was expected to move the arm.
+    /// Whether the arm followed a reference, so that nobody was expected to move it.
     pub follows_reference: bool,
     /// Time for which an external torque that would move a joint at rest has acted in the fault \[s\].
     pub residual_torque_s: f64,
 }
 
 impl<const N: usize> StoppingMotion<N> {
-    /// The motion of an arm that had this kinetic energy \[J\] before its fault, and may have followed a reference.
+    /// Creates the motion of an arm with the kinetic energy `before_j` \[J\] before its fault.
     pub fn new(before_j: f64, follows_reference: bool) -> StoppingMotion<N> {
         StoppingMotion {
             angles: [(Vector::zeros(), 0.0); MAX_WINDOW],
@@ -38,7 +39,7 @@ impl<const N: usize> StoppingMotion<N> {
     }
 
     /// Adds the angles of a cycle, which change in steps of `resolution_rad`. Returns whether the arm moves and has gained energy
-    /// since the first window, for certain.
+    /// since the first window by more than the resolution can explain.
     pub fn gains_energy(
         &mut self,
         config: &Config<N>,
@@ -50,7 +51,7 @@ impl<const N: usize> StoppingMotion<N> {
         let cycles = 1.0 / (config.estimator_rad_per_s * config.period_s);
         let window = cycles.min((MAX_WINDOW - 2) as f64) as usize + 1;
         self.angles[self.count % MAX_WINDOW] = (*position_rad, since_fault_s);
-        // Far beyond any window, with the same place in the ring.
+        // On overflow, continue at a count with the same index in the ring buffer.
         self.count = match self.count {
             usize::MAX => usize::MAX - MAX_WINDOW + 1,
             count => count + 1,
@@ -78,7 +79,7 @@ impl<const N: usize> StoppingMotion<N> {
     }
 }
 
-/// Whether a joint or the tip is faster than a fifth of its speed limit.
+/// Returns whether a joint or the tip is faster than a fifth of its speed limit.
 pub(super) fn is_moving<const N: usize>(
     limits: &Limits<N>,
     velocity_rad_per_s: &Vector<N>,

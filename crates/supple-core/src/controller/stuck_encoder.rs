@@ -1,13 +1,13 @@
-//! Encoders that stick: history of the encoders of the motors.
+//! Detection of stuck motor encoders from the history of their angles.
 //!
-//! One counts as stuck if it is unchanged
+//! An encoder counts as stuck if its angle is unchanged
 //!
-//! - while the reference of a joint that its motor drives moves, out of contact; less far in modes of joint references if
-//!   the encoder is fine, or all are unchanged;
-//! - while the external torque on its motor, as observed, grows beyond what dry friction holds: an encoder that works shows
-//!   what the elasticity of drive, arm and obstacle gives;
-//! - while, by the model, a breakaway ramp would move the joint;
-//! - after it stopped between two cycles: it was fast, or turned with its whole speed in the cycle before.
+//! - while the reference of a joint that its motor drives moves, out of contact. In modes with joint references a shorter
+//!   travel of the reference suffices if the encoder is fine, or if all encoders are unchanged;
+//! - while the observed external torque on its motor grows beyond what dry friction holds. A working encoder would change
+//!   by the elastic deflection of drive, arm and obstacle;
+//! - while a breakaway ramp would move the joint according to the model;
+//! - after it stopped between two cycles, although it was fast, or moved at full speed in the cycle before.
 
 use super::checks::MOVING_SHARE;
 use super::encoders::Encoders;
@@ -18,80 +18,80 @@ use crate::math::{Vector, abs};
 /// Fraction of `stuck_rad` that a fast joint may travel, at its last speed, while its encoder is unchanged (0.02 rad for
 /// 0.1 rad).
 const FAST_STOP_SHARE: f64 = 0.2;
-/// Counts per cycle by which an encoder moves at least, if it is to be seen to stop between two cycles.
+/// Minimum speed, in counts per cycle, at which the check detects that an encoder stops between two cycles.
 const SUDDEN_STOP_COUNTS: f64 = 1.5;
-/// Fraction of its speed with which it moves in the last cycle before. An impact takes some cycles: with a stiffness `k` on
-/// an inertia `m` a quarter period of `sqrt(m / k)`, 2 ms for the lightest wrist on a steel surface.
+/// Minimum fraction of its speed with which the encoder moves in the last cycle before a sudden stop. An impact takes some
+/// cycles: a quarter period of a mass `m` on a stiffness `k`, 2 ms for the lightest wrist on a steel surface.
 const FULL_SPEED_SHARE: f64 = 0.8;
-/// Fraction of that travel after which an encoder that stops so counts as stuck, and the least time \[s\]: what hits
-/// the arm so hard makes it rebound.
+/// Fraction of the [`FAST_STOP_SHARE`] travel after which an encoder that stops suddenly counts as stuck, and the minimum
+/// time \[s\]: after an impact of this strength the arm would rebound.
 const SUDDEN_STOP_TRAVEL_SHARE: f64 = 0.3;
 const SUDDEN_STOP_S: f64 = 0.02;
-/// Fraction of the speed above which a joint is fast, for an encoder that stops between two cycles: below it friction may
-/// hold a light joint as suddenly.
+/// Minimum speed of an encoder that stops between two cycles, as a fraction of the speed above which a joint is fast. Below
+/// it, friction may stop a light joint as suddenly.
 const SUDDEN_STOP_SPEED_SHARE: f64 = 0.2;
-/// Cycles with motion that make a contact plausible; encoders that stop one after the other show some.
+/// Number of cycles with motion that make a contact plausible. Encoders that stick one after the other still have some.
 const CONTACT_CYCLES: u32 = 5;
 /// Time for which the encoder of a joint in a collision may stay unchanged before it counts as stuck \[s\].
 const UNCHANGED_LIMIT_S: f64 = 0.03;
-/// The same under a torque that dry friction does not hold: longer than a blow takes to turn the joint by a count.
+/// The same time under a torque that dry friction does not hold \[s\]. A blow moves the joint by one count sooner.
 const LOADED_LIMIT_S: f64 = 0.02;
-/// Fraction of `stuck_rad` that a joint's reference may travel while its encoder, or none, changes, in modes of joint
-/// references: if all are unchanged, and if it is fine enough to show presliding, as under the torque of a breakaway ramp. At
-/// a few newtons per metre of tip stiffness dry friction may hold all joints at once, or one while others move; the springs
-/// of joints are stiffer.
+/// Fraction of `stuck_rad` that a joint's reference may travel in modes with joint references: while all encoders are
+/// unchanged, and while an encoder fine enough to resolve presliding is unchanged. The fractions are smaller than one because
+/// joint springs are stiff; at a tip stiffness of a few newtons per metre dry friction may hold one joint, or all of them.
 const ALL_STUCK_SHARE: f64 = 0.5;
 const FINE_STUCK_SHARE: f64 = 0.3;
-/// Smallest change up to which an encoder shows presliding, which turns friction round over some 5e-4 rad \[rad\].
+/// Maximum resolution step with which an encoder resolves presliding, in which friction reverses over some 5e-4 rad \[rad\].
 const FINE_ENCODER_RAD: f64 = 1e-4;
-/// Angle beyond presliding \[rad\], and the weight of what a ramp does to a joint that has turned further: an obstacle is
-/// as likely there as an encoder that sticks.
+/// Maximum presliding travel \[rad\], and the weight of the predicted acceleration of a joint that has moved further: an
+/// obstacle is then as likely as a stuck encoder.
 const PRESLIDING_RAD: f64 = 1e-3;
 const MOVED_SHARE: f64 = 0.75;
-/// Fraction of the dry friction up to which a ramp may not yet show in such an encoder: presliding has then turned the joint by
-/// two counts or more.
+/// Fraction of the dry friction below which a ramp may leave a fine encoder unchanged. At this torque presliding has moved
+/// the joint by two counts or more.
 const UNSEEN_FRICTION_SHARE: f64 = 0.4;
-/// Coarsest resolution of an encoder; one that has not changed has shown none \[rad\].
+/// Upper bound of an encoder's resolution step, used until the encoder has changed \[rad\].
 const MAX_RESOLUTION_RAD: f64 = 1e-3;
-/// Change of an angle that is none \[rad\].
+/// Change of an angle below which it counts as unchanged \[rad\].
 const NO_CHANGE_RAD: f64 = 1e-10;
 
-/// History of the encoders.
+/// History of the encoders. Arrays have one element per encoder, unless stated otherwise.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct StuckEncoders<const N: usize> {
     /// Last angle of each joint \[rad\].
     measured_rad: Vector<N>,
-    /// Of each encoder, as all that follows: the angle, and that at the last change of activity \[rad\].
+    /// Angle of each encoder now, and at the last change of activity \[rad\].
     angle_rad: Vector<N>,
     begin_rad: Vector<N>,
-    /// Last change, and smallest one \[rad\].
+    /// Last change of the angle, and smallest one so far \[rad\].
     change_rad: [f64; N],
     min_change_rad: [f64; N],
-    /// Unchanged since the last cycle.
+    /// Whether the angle is unchanged since the last cycle.
     unchanged: [bool; N],
     /// Speed at the last change \[rad/s\], and time since then \[s\].
     speed_rad_per_s: [f64; N],
     unchanged_s: [f64; N],
-    /// External torque on its motor when it stopped \[N m\], and time for which it has since been more than friction holds \[s\].
+    /// External torque on the motor when the encoder stopped \[N m\], and time for which the torque has since exceeded what
+    /// friction holds \[s\].
     external_nm: [f64; N],
     loaded_s: [f64; N],
     /// Travel of the reference since the last change \[rad\].
     travel_rad: [f64; N],
-    /// Speed at which a breakaway ramp would move its joint by the model, since an encoder last changed \[rad/s\].
-    ramped_rad_per_s: f64,
-    /// Torque of that ramp when they last changed \[N m\].
+    /// Speed that the ramped joint would have reached according to the model since one of its encoders last changed \[rad/s\].
+    ramp_speed_rad_per_s: f64,
+    /// Torque of the ramp when an encoder of the joint last changed \[N m\].
     ramp_nm: f64,
-    /// Of the joints in the last cycle.
+    /// Velocities of the joints in the last cycle \[rad/s\].
     last_velocity_rad_per_s: Vector<N>,
     /// Cycles of the present contact in which an encoder has changed, up to [`CONTACT_CYCLES`].
     contact_cycles: u32,
 }
 
-/// What a step of an encoder adds to the observed torque on its motor.
-pub(super) struct StepEffect {
-    /// Torque over the step \[N m/rad\].
+/// Effect of one resolution step of an encoder on the observed torque of its motor.
+pub(super) struct EncoderStepEffect {
+    /// Observed torque per step angle \[N m/rad\].
     pub nm_per_rad: f64,
-    /// Time after the step in which it shows \[s\].
+    /// Time for which the step affects the observed torque \[s\].
     pub lasts_s: f64,
 }
 
@@ -109,7 +109,7 @@ impl<const N: usize> Default for StuckEncoders<N> {
             external_nm: [0.0; N],
             loaded_s: [0.0; N],
             travel_rad: [0.0; N],
-            ramped_rad_per_s: 0.0,
+            ramp_speed_rad_per_s: 0.0,
             ramp_nm: 0.0,
             last_velocity_rad_per_s: Vector::zeros(),
             contact_cycles: 0,
@@ -123,11 +123,11 @@ impl<const N: usize> StuckEncoders<N> {
         self.measured_rad
     }
 
-    /// Receives the angles of the joints, the last ones where replies are missing.
+    /// Adds the joint angles of a cycle \[rad\]; where a reply is missing, the caller passes the last angle.
     #[inline(always)]
     pub fn receive(&mut self, encoders: &Encoders<N>, measured_rad: &Vector<N>) {
         self.measured_rad = *measured_rad;
-        let angle_rad = encoders.of_joints(measured_rad);
+        let angle_rad = encoders.from_joints(measured_rad);
         let last_rad = core::mem::replace(&mut self.angle_rad, angle_rad);
         for encoder in 0..N {
             let change_rad = abs(angle_rad[encoder] - last_rad[encoder]);
@@ -139,8 +139,8 @@ impl<const N: usize> StuckEncoders<N> {
         }
     }
 
-    /// Steps in which the angles of the joints change, as far as their encoders have shown: the smallest change of each, at most
-    /// [`MAX_RESOLUTION_RAD`] \[rad\].
+    /// Returns the resolution step of each joint angle \[rad\]: the smallest change observed so far, at most
+    /// [`MAX_RESOLUTION_RAD`].
     pub fn resolution_rad(&self, encoders: &Encoders<N>) -> Vector<N> {
         Vector::from_fn(|joint, _| {
             let changes = encoders.of(joint).map(|of| self.min_change_rad[of]);
@@ -148,7 +148,8 @@ impl<const N: usize> StuckEncoders<N> {
         })
     }
 
-    /// Adds a cycle to the time for which an external torque beyond the limit has grown by as much since the encoder stopped.
+    /// Adds a cycle to `loaded_s` if the external torque, which exceeds the limit, has grown by more than the limit since the
+    /// encoder stopped; otherwise resets that time.
     #[cold]
     #[inline(never)]
     fn add_load(
@@ -156,7 +157,7 @@ impl<const N: usize> StuckEncoders<N> {
         encoder: usize,
         torque_nm: f64,
         limit_nm: f64,
-        step: &impl Fn(usize) -> StepEffect,
+        step: &impl Fn(usize) -> EncoderStepEffect,
         elapsed_s: f64,
     ) {
         let step = step(encoder);
@@ -167,7 +168,7 @@ impl<const N: usize> StuckEncoders<N> {
             if unchanged_s <= step.lasts_s {
                 beyond_nm += step_nm;
             } else {
-                // The step no longer shows: what the torque was when the encoder stopped is now known without it.
+                // The last step no longer affects the observed torque: remove its effect from the torque at the stop.
                 let change_nm = torque_nm - self.external_nm[encoder];
                 self.external_nm[encoder] += change_nm.max(-step_nm).min(step_nm);
             }
@@ -181,7 +182,8 @@ impl<const N: usize> StuckEncoders<N> {
         };
     }
 
-    /// Smallest change of an encoder, its resolution; zero if all have been greater than [`MAX_RESOLUTION_RAD`] \[rad\].
+    /// Returns the resolution step of an encoder \[rad\]: its smallest change, or zero if every change exceeded
+    /// [`MAX_RESOLUTION_RAD`].
     fn step_rad(&self, encoder: usize) -> f64 {
         let change_rad = self.min_change_rad[encoder];
         if change_rad <= MAX_RESOLUTION_RAD {
@@ -191,41 +193,41 @@ impl<const N: usize> StuckEncoders<N> {
         }
     }
 
-    /// Whether an encoder is unchanged since the last cycle.
+    /// Returns whether any encoder is unchanged since the last cycle.
     pub fn any_unchanged(&self) -> bool {
         self.unchanged.contains(&true)
     }
 
-    /// Whether an encoder of a joint is unchanged since the last cycle.
+    /// Returns whether any encoder of a joint is unchanged since the last cycle.
     pub fn any_unchanged_of(&self, encoders: &Encoders<N>, joint: usize) -> bool {
         encoders.of(joint).any(|encoder| self.unchanged[encoder])
     }
 
-    /// Whether no encoder has changed since the last cycle.
+    /// Returns whether all encoders are unchanged since the last cycle.
     pub fn all_unchanged(&self) -> bool {
         !self.unchanged.contains(&false)
     }
 
-    /// Discards the evidence at a change of activity.
+    /// Resets the travel of the references and the ramp speed when an activity begins.
     pub fn begin(&mut self) {
         self.begin_rad = self.angle_rad;
         self.travel_rad = [0.0; N];
-        self.ramped_rad_per_s = 0.0;
+        self.ramp_speed_rad_per_s = 0.0;
         self.ramp_nm = 0.0;
     }
 
-    /// Suspends the checks in this cycle: a motion that ends now was stopped.
+    /// Skips the checks in this cycle, so that a motion that ends now does not count as a sudden stop.
     pub fn suspend(&mut self) {
         self.last_velocity_rad_per_s = Vector::zeros();
         self.speed_rad_per_s = [0.0; N];
         self.unchanged_s = [0.0; N];
     }
 
-    /// Speed at which a breakaway ramp of `ramp_nm` would move `joint` by the model, counted from the last change of its
-    /// encoders, with its inertia \[kg m^2\]. At rest some of the dry friction `dry_nm` \[N m\] holds it, or what has held it
-    /// while its encoders still changed, if that is more. Zero for an encoder that is too coarse to show the presliding of a
-    /// joint at rest: with friction that the model underestimates, an encoder that works would look like a stuck one.
-    pub fn ramped_rad_per_s(
+    /// Returns the speed \[rad/s\] to which a breakaway ramp of `ramp_nm` \[N m\] would have accelerated `joint` since its
+    /// encoders last changed, according to the model. Friction at rest holds a fraction of `dry_nm` \[N m\], or the ramp torque
+    /// at the last change if that is larger. Returns zero if an encoder is too coarse to resolve presliding: if the model
+    /// underestimates the friction, a working encoder would look stuck.
+    pub fn ramp_speed_rad_per_s(
         &mut self,
         encoders: &Encoders<N>,
         joint: usize,
@@ -247,16 +249,16 @@ impl<const N: usize> StuckEncoders<N> {
                 true => MOVED_SHARE,
                 false => 1.0,
             };
-            self.ramped_rad_per_s += share * excess_nm.max(0.0) / inertia_kg_m2 * elapsed_s;
+            self.ramp_speed_rad_per_s += share * excess_nm.max(0.0) / inertia_kg_m2 * elapsed_s;
         } else {
-            self.ramped_rad_per_s = 0.0;
+            self.ramp_speed_rad_per_s = 0.0;
             self.ramp_nm = abs(ramp_nm);
         }
-        self.ramped_rad_per_s
+        self.ramp_speed_rad_per_s
     }
 
-    /// Reports a stuck encoder if one that moves stops changing from one cycle to the next. `max_rad_per_s` are the limits of
-    /// the joints' speeds.
+    /// Reports an encoder as stuck if it moved and stops changing from one cycle to the next. `max_rad_per_s` are the speed
+    /// limits of the joints.
     pub fn check_sudden_stop(
         &mut self,
         encoders: &Encoders<N>,
@@ -280,7 +282,7 @@ impl<const N: usize> StuckEncoders<N> {
                 continue;
             }
             if self.unchanged_s[encoder] == 0.0 {
-                let speed_rad_per_s = encoders.of_joints_at(encoder, &last_rad_per_s);
+                let speed_rad_per_s = encoders.from_joints_at(encoder, &last_rad_per_s);
                 self.speed_rad_per_s[encoder] = abs(speed_rad_per_s);
             }
             self.unchanged_s[encoder] += elapsed_s;
@@ -288,7 +290,7 @@ impl<const N: usize> StuckEncoders<N> {
             let value_rad = self.speed_rad_per_s[encoder] * self.unchanged_s[encoder];
             let fast_rad_per_s = MOVING_SHARE * max_rad_per_s[joint];
             if value_rad > SUDDEN_STOP_TRAVEL_SHARE * limit_rad
-                && let Some(share) = self.stopped_at(encoder, fast_rad_per_s, elapsed_s)
+                && let Some(share) = self.stop_limit_share(encoder, fast_rad_per_s, elapsed_s)
                 && value_rad > share * limit_rad
             {
                 return Err(Fault::EncoderStuck {
@@ -301,10 +303,10 @@ impl<const N: usize> StuckEncoders<N> {
         Ok(())
     }
 
-    /// Fraction of the limit of travel after which an encoder that no longer changes counts as stuck: if it turned with its
-    /// whole speed, fast enough to see that, in the last cycle before; all of it, if it was fast.
+    /// Returns the fraction of the travel limit after which an unchanged encoder counts as stuck:
+    /// [`SUDDEN_STOP_TRAVEL_SHARE`] if it moved at full speed in the cycle before it stopped, one if it was fast, else `None`.
     #[inline(never)]
-    fn stopped_at(&self, encoder: usize, fast_rad_per_s: f64, elapsed_s: f64) -> Option<f64> {
+    fn stop_limit_share(&self, encoder: usize, fast_rad_per_s: f64, elapsed_s: f64) -> Option<f64> {
         let speed_rad_per_s = self.speed_rad_per_s[encoder];
         let travel_rad = speed_rad_per_s * elapsed_s;
         let sudden = self.unchanged_s[encoder] > SUDDEN_STOP_S
@@ -317,10 +319,10 @@ impl<const N: usize> StuckEncoders<N> {
         }
     }
 
-    /// Reports a stuck encoder if it is unchanged although the external torque on its motor has grown beyond
-    /// `stiction_limit_nm`, what dry friction holds, for some time. A torque that was that large when the encoder stopped may be
-    /// that of an obstacle. While the observed torque shows the last step of the encoder, growth by so much does not count, and is
-    /// no growth later. After [`StuckEncoders::check_sudden_stop`] of the same cycle.
+    /// Reports an encoder as stuck if it is unchanged although, for [`LOADED_LIMIT_S`], the external torque on its motor has
+    /// grown by more than `stiction_limit_nm`, the torque that dry friction holds. The torque at the time of the stop does not
+    /// count, since an obstacle may cause it; neither does the effect of the encoder's last step on the observed torque. Call it
+    /// after [`StuckEncoders::check_sudden_stop`] of the same cycle.
     #[inline(never)]
     pub fn check_torque(
         &mut self,
@@ -328,7 +330,7 @@ impl<const N: usize> StuckEncoders<N> {
         plausible: &PlausibilityLimits,
         external_nm: &Vector<N>,
         stiction_limit_nm: &Vector<N>,
-        step: impl Fn(usize) -> StepEffect,
+        step: impl Fn(usize) -> EncoderStepEffect,
         elapsed_s: f64,
     ) -> Result<(), Fault> {
         for encoder in 0..N {
@@ -357,8 +359,8 @@ impl<const N: usize> StuckEncoders<N> {
         Ok(())
     }
 
-    /// Reports a joint collision as a stuck encoder if no encoder of the joint has changed for some time: both are equally
-    /// likely, and gravity compensation from a wrong angle would not hold the arm.
+    /// Turns a joint collision into a stuck encoder if no encoder of the joint has changed for [`UNCHANGED_LIMIT_S`]: both
+    /// causes are equally likely, and gravity compensation from a wrong angle would not hold the arm.
     pub fn as_stuck_encoder(
         &self,
         plausible: &PlausibilityLimits,
@@ -384,7 +386,7 @@ impl<const N: usize> StuckEncoders<N> {
         }
     }
 
-    /// Whether the latched contact is one: encoders have changed in [`CONTACT_CYCLES`] of its cycles.
+    /// Returns whether the latched contact is plausible: encoders have changed in [`CONTACT_CYCLES`] of its cycles.
     pub fn is_contact_plausible(&mut self, in_contact: bool) -> bool {
         if !in_contact {
             self.contact_cycles = 0;
@@ -394,8 +396,8 @@ impl<const N: usize> StuckEncoders<N> {
         self.contact_cycles >= CONTACT_CYCLES
     }
 
-    /// Reports a stuck encoder if it is unchanged while its reference travels further than `stuck_rad`, or than a
-    /// fraction of it in modes of joint references.
+    /// Reports an encoder as stuck if it is unchanged while its reference travels further than `stuck_rad`, or further than a
+    /// fraction of it in modes with joint references (`joint_reference`).
     pub fn check_reference(
         &mut self,
         encoders: &Encoders<N>,
@@ -407,7 +409,7 @@ impl<const N: usize> StuckEncoders<N> {
         if !self.any_unchanged() {
             return Ok(());
         }
-        let reference_rad_per_s = encoders.of_joints(reference_rad_per_s);
+        let reference_rad_per_s = encoders.from_joints(reference_rad_per_s);
         for encoder in 0..N {
             if !self.unchanged[encoder] {
                 continue;

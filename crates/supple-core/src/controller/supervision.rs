@@ -1,17 +1,19 @@
-//! Checks of a cycle: motion against its limits, external torque and force against what is plausible and allowed.
+//! Checks of a cycle: motion against its limits, observed external torque and force against their thresholds.
 
 use super::Controller;
 use super::activity::Activity;
 use super::checks;
 use super::checks::COMPLIANT_SPEED_SHARE;
 use super::fault::Fault;
-use super::latch::Evidence;
+use super::latch::LatchInput;
 use super::oscillation::Oscillation;
-use super::plausibility::{JointMotion, PlausibilityInput, falls, joint_collision, tip_collision};
+use super::plausibility::{
+    JointMotion, PlausibilityInput, check_joint_collision, check_tip_collision, is_falling_away,
+};
 use super::pose_task::PoseCycle;
 use super::position_limits::PositionLimits;
 use super::state::State;
-use super::stuck_encoder::StepEffect;
+use super::stuck_encoder::EncoderStepEffect;
 use crate::config::Config;
 use crate::law::impedance::{SINGULAR_BELOW_M, Task};
 use crate::law::learned::LearnedAtPose;
@@ -19,21 +21,21 @@ use crate::math::{Vector, Vector3, abs};
 use crate::model::workspace::WorkspaceViolation;
 use crate::trajectory::Reference;
 
-/// Time for which the elasticity of an arm swings after its drives have become active \[s\]. A motor then accelerates without its
-/// link, and the observer takes it for up to twice the gravity torque.
+/// Time for which an elastic arm oscillates after its drives have become active \[s\]. A motor then accelerates without its
+/// link, and the observer reports an external torque of up to twice the gravity torque.
 const ACTIVATION_S: f64 = 0.05;
-/// Factor of the collision thresholds within it.
+/// Factor of the collision thresholds within this time.
 const ACTIVATION_RATIO: f64 = 2.0;
-/// Time for which a swing exceeds the thresholds at most \[s\]. What exceeds them for longer is a collision all the same.
+/// Maximum time for which such an oscillation exceeds the thresholds \[s\]. A longer excess is a collision.
 const SWING_S: f64 = 0.008;
 
-/// Whether the pose is regular, so that the tip force can be estimated from the joint torques.
+/// Returns whether the pose is regular, so that the tip force can be estimated from the joint torques.
 fn is_regular<const N: usize>(task: &Task<N>) -> bool {
     task.min_singular_value_m >= SINGULAR_BELOW_M
 }
 
 impl<const N: usize> State<N> {
-    /// Brings limits that began where the arm was back to those of the configuration.
+    /// Returns relaxed position limits step by step to those of the configuration.
     #[inline(always)]
     pub(super) fn update_position_limits(&mut self, config: &Config<N>, elapsed_s: f64) {
         if self.position_limits.relaxed {
@@ -61,8 +63,8 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Lets the limits begin where the arm is. Called in every cycle in which they are not in force: with idle drives,
-    /// without torque, in a fault.
+    /// Relaxes the position limits so that they contain the present pose. Called in every cycle in which the limits do not
+    /// apply: with idle drives, without torque, in a fault.
     #[cold]
     #[inline(never)]
     pub(super) fn relax_position_limits(&mut self, config: &Config<N>) {
@@ -156,7 +158,7 @@ impl<const N: usize> State<N> {
         let mut tip_falls = false;
         if let Some(reference) = self.joint_reference(config) {
             reference_rad_per_s = reference.velocity_rad_per_s;
-            self.add_ramped_motion(controller, &mut reference_rad_per_s, elapsed_s);
+            self.set_ramp_reference_speed(controller, &mut reference_rad_per_s, elapsed_s);
         }
         if let Some(reference) = reference {
             self.latch.update_direction(&reference.velocity, elapsed_s);
@@ -173,18 +175,17 @@ impl<const N: usize> State<N> {
                 })
                 .sum();
             let was_in_contact = self.latch.in_contact();
-            let evidence = Evidence {
+            let input = LatchInput {
                 force_n: force,
                 friction_uncertainty_n,
                 tip_velocity_m_per_s: self.terms.jacobian.fixed_rows::<3>(0)
                     * self.estimator.velocity_rad_per_s,
             };
-            self.latch
-                .update_contact(&config.latch, &evidence, elapsed_s);
+            self.latch.update_contact(&config.latch, &input, elapsed_s);
             let gravity = config.arm.gravity();
             if force.dot(&gravity) > controller.load_n_m_per_s2() {
-                let away_m_per_s = evidence.tip_velocity_m_per_s - reference.velocity;
-                tip_falls = falls(&away_m_per_s, &gravity);
+                let away_m_per_s = input.tip_velocity_m_per_s - reference.velocity;
+                tip_falls = is_falling_away(&away_m_per_s, &gravity);
             }
             if self.latch.in_contact() && !was_in_contact {
                 self.contact_velocity_rad_per_s = velocity;
@@ -193,23 +194,23 @@ impl<const N: usize> State<N> {
         } else if self.is_resting(&reference_rad_per_s) && is_regular(task) {
             self.latch.observe_at_rest(&config.latch, &force, elapsed_s);
         }
-        let evidence = PlausibilityInput {
+        let input = PlausibilityInput {
             reference_rad_per_s: &reference_rad_per_s,
             net_torque_nm: &net_torque,
             force_n: &force,
-            falls: tip_falls,
-            regular: is_regular(task),
+            is_falling_away: tip_falls,
+            pose_is_regular: is_regular(task),
             elapsed_s,
         };
-        match self.check_plausibility(controller, &evidence) {
+        match self.check_plausibility(controller, &input) {
             Ok(()) => Ok(force),
             Err(fault) => Err((force, fault)),
         }
     }
 
-    /// Sets the speed at which a breakaway ramp would move its joint by the model.
+    /// Sets the reference speed of a ramped joint to the speed that the breakaway ramp would cause according to the model.
     #[inline(never)]
-    fn add_ramped_motion(
+    fn set_ramp_reference_speed(
         &mut self,
         controller: &Controller<N>,
         reference_rad_per_s: &mut Vector<N>,
@@ -222,7 +223,7 @@ impl<const N: usize> State<N> {
         let ramp_nm = ramp.rate_nm_per_s * self.activity_s(config);
         let dry_nm = self.friction[joint].dry_size_nm(0.0);
         let inertia_kg_m2 = self.terms.mass_matrix[(joint, joint)];
-        reference_rad_per_s[joint] = self.stuck_encoders.ramped_rad_per_s(
+        reference_rad_per_s[joint] = self.stuck_encoders.ramp_speed_rad_per_s(
             controller.encoders(),
             joint,
             ramp_nm,
@@ -232,13 +233,13 @@ impl<const N: usize> State<N> {
         );
     }
 
-    /// Whether the arm is to be at rest and nobody is to push it.
+    /// Returns whether the arm is expected to be at rest without being pushed.
     fn is_resting(&self, reference_rad_per_s: &Vector<N>) -> bool {
         matches!(self.activity, Activity::GravityHold | Activity::Move { .. })
             && reference_rad_per_s.iter().all(|speed| *speed == 0.0)
     }
 
-    /// Whether the arm holds a pose: in gravity hold, or after the end of a move.
+    /// Returns whether the arm holds a pose: in gravity hold, or after the end of a move.
     fn holds_still(&self, config: &Config<N>) -> bool {
         match &self.activity {
             Activity::GravityHold => true,
@@ -289,10 +290,11 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// A collision, judged again if the drives have just become active: with raised thresholds unless it lasts.
+    /// Repeats the check of a collision with raised thresholds if the drives have just become active and the excess is short;
+    /// otherwise returns the fault.
     #[cold]
     #[inline(never)]
-    fn unless_activated(
+    fn recheck_after_activation(
         &mut self,
         config: &Config<N>,
         fault: Fault,
@@ -300,8 +302,8 @@ impl<const N: usize> State<N> {
     ) -> Result<(), Fault> {
         let cycle = self.cycle.unwrap_or(0);
         let (first, last) = self.exceeded_cycles;
-        let goes_on = cycle.wrapping_sub(last) <= 1;
-        let first = if goes_on { first } else { cycle };
+        let continues = cycle.wrapping_sub(last) <= 1;
+        let first = if continues { first } else { cycle };
         self.exceeded_cycles = (first, cycle);
         let lasts = cycle.wrapping_sub(first) as f64 * config.period_s > SWING_S;
         match self.activated_within(config, ACTIVATION_S) && !lasts {
@@ -314,18 +316,18 @@ impl<const N: usize> State<N> {
     fn check_plausibility(
         &mut self,
         controller: &Controller<N>,
-        evidence: &PlausibilityInput<'_, N>,
+        input: &PlausibilityInput<'_, N>,
     ) -> Result<(), Fault> {
         let (config, encoders) = (controller.config(), controller.encoders());
         let (plausibility, stuck) = (&mut self.plausibility, &mut self.stuck_encoders);
-        if evidence.elapsed_s > 0.0 {
+        if input.elapsed_s > 0.0 {
             let velocity = &self.estimator.velocity_rad_per_s;
             stuck.check_sudden_stop(
                 encoders,
                 &config.plausible,
                 velocity,
                 &config.limits.joint_speed_rad_per_s,
-                evidence.elapsed_s,
+                input.elapsed_s,
             )?;
             let external_nm = self.observer.external_torque_nm();
             if stuck.any_unchanged() {
@@ -337,46 +339,47 @@ impl<const N: usize> State<N> {
                     |encoder| {
                         let (step, mass_matrix) =
                             (controller.encoder_step(), &self.terms.mass_matrix);
-                        StepEffect {
+                        EncoderStepEffect {
                             nm_per_rad: encoders.inertia_at(encoder, mass_matrix)
                                 * step.observed_per_s2,
                             lasts_s: step.lasts_s,
                         }
                     },
-                    evidence.elapsed_s,
+                    input.elapsed_s,
                 )?;
             }
             let motion = JointMotion {
                 momentum: &self.terms.momentum,
                 velocity_rad_per_s: velocity,
-                reference_rad_per_s: evidence.reference_rad_per_s,
+                reference_rad_per_s: input.reference_rad_per_s,
             };
             let against = plausibility.check_against_torque(
-                controller.against_limits(),
+                controller.against_torque_limits(),
                 &motion,
-                evidence.net_torque_nm,
-                evidence.elapsed_s,
+                input.net_torque_nm,
+                input.elapsed_s,
             );
             let limits_rad_per_s = &config.limits.joint_speed_rad_per_s;
             let steady = self
                 .oscillation
-                .check(velocity, limits_rad_per_s, evidence.elapsed_s);
+                .check(velocity, limits_rad_per_s, input.elapsed_s);
             // Not checked in a fault: a stopping arm may be pushed back, and `stop.rs` supervises
             // the stop.
             if !matches!(self.activity, Activity::Fault(_)) {
                 against?;
                 steady?;
             }
-            // In contact, joints may be at rest while their references move, at a few newtons per metre also some while
-            // others move. Encoders that are all stuck make a contact themselves: it counts once they have changed in it.
+            // In contact, joints may be at rest while their references move; at a stiffness of a few newtons per metre, some
+            // joints rest while others move. If all encoders are stuck, the observer itself reports a contact; therefore a
+            // contact counts only after encoders have changed during it.
             if !stuck.is_contact_plausible(self.latch.in_contact()) {
                 let joint_reference = self.activity.has_joint_reference();
                 stuck.check_reference(
                     encoders,
                     &config.plausible,
-                    evidence.reference_rad_per_s,
+                    input.reference_rad_per_s,
                     joint_reference,
-                    evidence.elapsed_s,
+                    input.elapsed_s,
                 )?;
             }
         }
@@ -388,31 +391,31 @@ impl<const N: usize> State<N> {
         } else {
             (&collision.joint_torque_nm, collision.tip_force_n)
         };
-        joint_collision(joint_torque_nm, &external)
+        check_joint_collision(joint_torque_nm, &external)
             .or_else(|fault| {
-                self.unless_activated(config, fault, |ratio| {
-                    joint_collision(&(joint_torque_nm * ratio), &external)
+                self.recheck_after_activation(config, fault, |ratio| {
+                    check_joint_collision(&(joint_torque_nm * ratio), &external)
                 })
             })
             .map_err(|fault| {
                 self.stuck_encoders
                     .as_stuck_encoder(&config.plausible, encoders, fault)
             })?;
-        if !evidence.regular {
+        if !input.pose_is_regular {
             return Ok(());
         }
-        tip_collision(tip_force_n, evidence.force_n).or_else(|fault| {
-            self.unless_activated(config, fault, |ratio| {
-                tip_collision(tip_force_n * ratio, evidence.force_n)
+        check_tip_collision(tip_force_n, input.force_n).or_else(|fault| {
+            self.recheck_after_activation(config, fault, |ratio| {
+                check_tip_collision(tip_force_n * ratio, input.force_n)
             })
         })?;
-        if evidence.falls || self.holds_still(config) {
+        if input.is_falling_away || self.holds_still(config) {
             let (gravity, limit_n) = (config.arm.gravity(), config.plausible.load_n);
             self.plausibility.check_unmodelled_load(
-                evidence.force_n,
+                input.force_n,
                 &gravity,
                 limit_n,
-                evidence.elapsed_s,
+                input.elapsed_s,
             )?;
         } else {
             self.plausibility.reset_load();

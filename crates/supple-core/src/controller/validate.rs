@@ -50,7 +50,7 @@ impl core::error::Error for ConfigError {}
 const POSITIVE: &str = "finite and positive";
 const NOT_NEGATIVE: &str = "finite and not negative";
 
-fn positive(entry: &'static str, value: f64) -> Result<(), ConfigError> {
+fn check_positive(entry: &'static str, value: f64) -> Result<(), ConfigError> {
     check(
         value.is_finite() && value > 0.0,
         entry,
@@ -60,7 +60,7 @@ fn positive(entry: &'static str, value: f64) -> Result<(), ConfigError> {
     )
 }
 
-fn not_negative(entry: &'static str, value: f64) -> Result<(), ConfigError> {
+fn check_not_negative(entry: &'static str, value: f64) -> Result<(), ConfigError> {
     check(
         value.is_finite() && value >= 0.0,
         entry,
@@ -89,16 +89,16 @@ fn check(
     }
 }
 
-fn each<const N: usize>(
+fn check_each_joint<const N: usize>(
     entry: &'static str,
     values: &Vector<N>,
     zero_allowed: bool,
 ) -> Result<(), ConfigError> {
     for (joint, value) in values.iter().enumerate() {
         let result = if zero_allowed {
-            not_negative(entry, *value)
+            check_not_negative(entry, *value)
         } else {
-            positive(entry, *value)
+            check_positive(entry, *value)
         };
         result.map_err(|error| ConfigError {
             joint: Some(joint),
@@ -131,8 +131,8 @@ pub(super) fn gains(gains: &Gains, stiffness: f64, damping: f64) -> Result<(), C
 
 fn pose<const N: usize>(pose: &PoseLaw<N>) -> Result<(), ConfigError> {
     let (stiffest, most) = (pose.max_stiffness_nm_per_rad, pose.max_damping_nm_s_per_rad);
-    positive("rotational stiffness limit", stiffest)?;
-    positive("rotational damping limit", most)?;
+    check_positive("rotational stiffness limit", stiffest)?;
+    check_positive("rotational damping limit", most)?;
     for (entry, values, limit) in [
         (
             "rotational stiffness_nm_per_rad",
@@ -155,17 +155,17 @@ fn pose<const N: usize>(pose: &PoseLaw<N>) -> Result<(), ConfigError> {
             )?;
         }
     }
-    positive("angular_speed_rad_per_s", pose.angular_speed_rad_per_s)?;
-    positive("rotation_error_rad", pose.rotation_error_rad)?;
-    each(
+    check_positive("angular_speed_rad_per_s", pose.angular_speed_rad_per_s)?;
+    check_positive("rotation_error_rad", pose.rotation_error_rad)?;
+    check_each_joint(
         "posture_stiffness_nm_per_rad",
         &pose.posture_stiffness_nm_per_rad,
         true,
     )?;
-    each("posture_torque_nm", &pose.posture_torque_nm, true)
+    check_each_joint("posture_torque_nm", &pose.posture_torque_nm, true)
 }
 
-/// Softer joints need more than a correction of the angle.
+/// Maximum compliance \[rad/(N m)\]: for softer joints a static correction of the angle is not sufficient.
 const MAX_COMPLIANCE_RAD_PER_NM: f64 = 0.02;
 
 pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigError> {
@@ -182,9 +182,9 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
                 must,
             })?;
     }
-    positive("soft_zone_rad", limits.soft_zone_rad)?;
-    positive("stiffness limit", limits.stiffness_n_per_m)?;
-    positive("damping limit", limits.damping_n_s_per_m)?;
+    check_positive("soft_zone_rad", limits.soft_zone_rad)?;
+    check_positive("stiffness limit", limits.stiffness_n_per_m)?;
+    check_positive("damping limit", limits.damping_n_s_per_m)?;
     roles(config)?;
     let square = config.joint_from_motor * config.joint_from_motor.transpose();
     let scale = square.trace() / N as f64;
@@ -206,9 +206,9 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
             "from 0 to 0.02",
         )?;
     }
-    positive("period_s", config.period_s)?;
-    positive("estimator_rad_per_s", config.estimator_rad_per_s)?;
-    positive("handover_s", config.handover_s)?;
+    check_positive("period_s", config.period_s)?;
+    check_positive("estimator_rad_per_s", config.estimator_rad_per_s)?;
+    check_positive("handover_s", config.handover_s)?;
     gains(
         &law.gains,
         limits.stiffness_n_per_m,
@@ -224,14 +224,14 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
             "symmetric and positive definite (the value is its determinant)",
         )?;
     }
-    not_negative(
+    check_not_negative(
         "nullspace_damping_nm_s_per_rad",
         law.nullspace_damping_nm_s_per_rad,
     )?;
-    positive("observer_rad_per_s", latch.observer_rad_per_s)?;
-    positive("threshold_n", latch.threshold_n)?;
-    not_negative("friction_error", latch.friction_error)?;
-    not_negative("reversal_s", latch.reversal_s)?;
+    check_positive("observer_rad_per_s", latch.observer_rad_per_s)?;
+    check_positive("threshold_n", latch.threshold_n)?;
+    check_not_negative("friction_error", latch.friction_error)?;
+    check_not_negative("reversal_s", latch.reversal_s)?;
     check(
         (0.0..=1.0).contains(&latch.contact_share),
         "contact_share",
@@ -239,31 +239,31 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
         latch.contact_share,
         "from 0 to 1",
     )?;
-    positive("fade_s", latch.fade_s)?;
-    positive("restore_s", latch.restore_s)?;
-    not_negative("settle_s", latch.settle_s)?;
+    check_positive("fade_s", latch.fade_s)?;
+    check_positive("restore_s", latch.restore_s)?;
+    check_not_negative("settle_s", latch.settle_s)?;
     for (name, value) in [
         ("false_alarms_per_hour", latch.false_alarms_per_hour),
         ("release_s", latch.release_s),
     ] {
         check(value > 0.0, name, None, value, "positive; infinite is off")?;
     }
-    each(
+    check_each_joint(
         "move stiffness_nm_per_rad",
         &config.move_gains.stiffness_nm_per_rad,
         false,
     )?;
-    each(
+    check_each_joint(
         "move damping_nm_s_per_rad",
         &config.move_gains.damping_nm_s_per_rad,
         true,
     )?;
-    each(
+    check_each_joint(
         "impedance_stiffness_nm_per_rad",
         &config.joint_gains.stiffness_nm_per_rad,
         true,
     )?;
-    each(
+    check_each_joint(
         "impedance_damping_nm_s_per_rad",
         &config.joint_gains.damping_nm_s_per_rad,
         true,
@@ -287,68 +287,68 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
         config.float_friction_share,
         "from 0 to 1",
     )?;
-    each(
+    check_each_joint(
         "hold_damping_nm_s_per_rad",
         &config.hold_damping_nm_s_per_rad,
         true,
     )?;
-    each(
+    check_each_joint(
         "soft_stiffness_nm_per_rad",
         &limits.soft_stiffness_nm_per_rad,
         true,
     )?;
-    each(
+    check_each_joint(
         "soft_damping_nm_s_per_rad",
         &limits.soft_damping_nm_s_per_rad,
         true,
     )?;
-    each(
+    check_each_joint(
         "joint_speed_rad_per_s",
         &limits.joint_speed_rad_per_s,
         false,
     )?;
-    each("joint_torque_nm", &limits.joint_torque_nm, false)?;
-    each("motor_torque_nm", &limits.motor_torque_nm, false)?;
-    each("torque_rate_nm_per_s", &limits.torque_rate_nm_per_s, false)?;
-    positive("tip_speed_m_per_s", limits.tip_speed_m_per_s)?;
-    positive(
+    check_each_joint("joint_torque_nm", &limits.joint_torque_nm, false)?;
+    check_each_joint("motor_torque_nm", &limits.motor_torque_nm, false)?;
+    check_each_joint("torque_rate_nm_per_s", &limits.torque_rate_nm_per_s, false)?;
+    check_positive("tip_speed_m_per_s", limits.tip_speed_m_per_s)?;
+    check_positive(
         "tip_acceleration_m_per_s2",
         limits.tip_acceleration_m_per_s2,
     )?;
-    each(
+    check_each_joint(
         "joint_acceleration_rad_per_s2",
         &limits.joint_acceleration_rad_per_s2,
         false,
     )?;
-    each(
+    check_each_joint(
         "joint_jerk_rad_per_s3",
         &limits.joint_jerk_rad_per_s3,
         false,
     )?;
     let collision = &config.collision;
-    each(
+    check_each_joint(
         "collision joint_torque_nm",
         &collision.joint_torque_nm,
         false,
     )?;
-    positive("collision tip_force_n", collision.tip_force_n)?;
+    check_positive("collision tip_force_n", collision.tip_force_n)?;
     let plausible = &config.plausible;
-    positive("plausible stuck_rad", plausible.stuck_rad)?;
-    positive("plausible against_share", plausible.against_share)?;
-    positive("plausible load_n", plausible.load_n)?;
-    each(
+    check_positive("plausible stuck_rad", plausible.stuck_rad)?;
+    check_positive("plausible against_share", plausible.against_share)?;
+    check_positive("plausible load_n", plausible.load_n)?;
+    check_each_joint(
         "collision move_joint_torque_nm",
         &collision.move_joint_torque_nm,
         false,
     )?;
-    positive("collision move_tip_force_n", collision.move_tip_force_n)?;
+    check_positive("collision move_tip_force_n", collision.move_tip_force_n)?;
     if let Some((entry, value, must)) = config.workspace.first_invalid() {
         return check(false, entry, None, value, must);
     }
     learned(config)?;
-    positive("tracking_error_m", limits.tracking_error_m)?;
-    positive("joint_tracking_error_rad", limits.joint_tracking_error_rad)?;
-    positive("start_error_m", limits.start_error_m)
+    check_positive("tracking_error_m", limits.tracking_error_m)?;
+    check_positive("joint_tracking_error_rad", limits.joint_tracking_error_rad)?;
+    check_positive("start_error_m", limits.start_error_m)
 }
 
 fn learned<const N: usize>(config: &Config<N>) -> Result<(), ConfigError> {

@@ -1,9 +1,9 @@
-//! Faults, refusals and reasons of the drive guard in words, with the names that the arm gives its joints.
+//! Messages of faults, refusals and the drive guard, with the joint names of the arm.
 
 use crate::record::Text;
 use core::fmt;
 
-/// A joint as messages call it: `joint elbow`, or by its index from 0 where it has no name, `joint 2`.
+/// Name of a joint in messages: `joint elbow`, or for a joint without a name its index from 0, `joint 2`.
 #[derive(Clone, Copy, Debug)]
 pub struct JointLabel<'a> {
     joint: usize,
@@ -28,7 +28,7 @@ impl fmt::Display for JointLabel<'_> {
 
 /// A message that names joints.
 pub trait NamesJoints {
-    /// Writes the message; joints beyond `names` have their index.
+    /// Writes the message; a joint without an element in `names` is written by its index.
     ///
     /// # Errors
     /// Those of the formatter.

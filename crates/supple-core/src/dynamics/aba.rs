@@ -49,9 +49,9 @@ impl AbaJoint {
     };
 }
 
-/// Joint accelerations \[rad/s^2\] under the torques `tau` \[N m\], without friction.
+/// Returns the joint accelerations \[rad/s^2\] under the torques `tau` \[N m\], without friction.
 ///
-/// `q` \[rad\], `qd` \[rad/s\]. The inverse of [`rnea`](super::rnea).
+/// `q` \[rad\], `qd` \[rad/s\]. This is the inverse of [`rnea`](super::rnea).
 #[cfg_attr(not(debug_assertions), inline)]
 pub fn aba<const N: usize>(
     arm: &Arm<N>,
@@ -124,7 +124,7 @@ fn forward_dynamics<const N: usize, const G: usize>(
     qdd
 }
 
-/// Articulated body of link `i` alone.
+/// Returns the articulated body of link `i` alone.
 #[inline(always)]
 fn link<const N: usize>(arm: &Arm<N>, i: usize, angular_velocity: V3) -> Articulated {
     let body = |k: usize| arm.rows.inertial_parameter(k, i);
@@ -184,7 +184,7 @@ impl Articulated {
         self.force = add(self.force, other.force);
     }
 
-    /// Articulated inertia and bias force as seen by the parent: projects out the joint's free
+    /// Returns articulated inertia and bias force at the parent: projects out the joint's free
     /// direction.
     #[inline(always)]
     fn project(&mut self, hinge: &AbaJoint) {
@@ -204,8 +204,8 @@ impl Articulated {
         self.force = add(self.force, add_scaled(force, df, hinge.net_torque));
     }
 
-    /// Expressed in the parent's joint frame; `p` and `r` are this frame's position and rotation in
-    /// it.
+    /// Returns the body in the parent's joint frame; `p` and `r` are position and rotation of the body's frame in the
+    /// parent's frame.
     #[inline(always)]
     fn in_parent(&self, r: &[f64; 9], p: V3) -> Articulated {
         let (a, c) = (rotated(r, &self.a), rotated(r, &self.c));

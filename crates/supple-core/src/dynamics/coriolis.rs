@@ -1,7 +1,7 @@
 //! Velocity products: `C(q, qd) qd` and the Christoffel matrix `C(q, qd)`.
 //!
 //! The matrix is built from `B_i = ((v x*) I - I (v x) + (I v) xbar*) / 2` of each body, summed over
-//! what each joint carries (Echeandia and Wensing, "Numerical methods to compute the Coriolis matrix
+//! the bodies that each joint moves (Echeandia and Wensing, "Numerical methods to compute the Coriolis matrix
 //! and Christoffel symbols for rigid-body systems", 2021), so that `H' - 2 C` is skew. Spatial vectors
 //! here are angular first.
 
@@ -10,7 +10,7 @@ use super::rotations::parent_rotations;
 use crate::math::{Matrix, Matrix3, Vector, Vector3, skew};
 use crate::model::arm::Arm;
 
-/// `C(q, qd) qd` \[N m\]: inverse dynamics at `qdd = 0` without gravity.
+/// Returns `C(q, qd) qd` \[N m\]: inverse dynamics at `qdd = 0` without gravity.
 pub fn coriolis<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>) -> Vector<N> {
     let weightless = Arm {
         gravity: Vector3::zeros(),
@@ -19,7 +19,7 @@ pub fn coriolis<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>) -> 
     rnea(&weightless, q, qd, &Vector::zeros())
 }
 
-/// Christoffel matrix `C(q, qd)` \[N m s/rad\]: `C_ij = sum_k Gamma^i_jk qd_k` of Eq. (3.1).
+/// Returns the Christoffel matrix `C(q, qd)` \[N m s/rad\]: `C_ij = sum_k Gamma^i_jk qd_k` of Eq. (3.1).
 pub fn coriolis_matrix<const N: usize>(
     arm: &Arm<N>,
     q: &Vector<N>,

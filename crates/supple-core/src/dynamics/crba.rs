@@ -16,7 +16,7 @@ use crate::math::vec3::{add, cross, dot, dot6, rotate, rotate_back, scale, sub};
 use crate::math::{Matrix, Vector};
 use crate::model::arm::Arm;
 
-/// Symmetric mass matrix `H(q)`, with the rotor inertias added to its diagonal \[kg m^2\]. `q` \[rad\].
+/// Returns the symmetric mass matrix `H(q)`, with the rotor inertias added to its diagonal \[kg m^2\]. `q` \[rad\].
 #[cfg_attr(not(debug_assertions), inline)]
 pub fn crba<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
     match N {
@@ -33,10 +33,10 @@ fn of_position<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> M
     symmetric(&mass_columns(arm, &joint_motions(&chain, last), &carried))
 }
 
-/// Mass matrix of up to three joints; each lane computes the contribution of one link to
+/// Returns the mass matrix of up to three joints; each lane computes the contribution of one link to
 /// `H_ij = sum over k >= max(i, j) of (m_k v_ik . v_jk + w_ik . I_k w_jk)`, with `v_ik` and `w_ik` the velocity of the centre
 /// of mass and the angular velocity of link `k` for unit speed of joint `i` alone. `v` is in the frame of the first joint, `w`
-/// in that of link `k`. Lanes of links that joint `j` does not move have meaningless values, which are not added.
+/// in the frame of link `k`. Lanes of links that joint `j` does not move have meaningless values, which are not added.
 #[cfg_attr(not(debug_assertions), inline)]
 fn link_by_link<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
     let chain = Chain::<1>::from_first_joint(arm, q);

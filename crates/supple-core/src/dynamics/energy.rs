@@ -5,7 +5,7 @@ use super::rotations::parent_rotations;
 use crate::math::{Vector, Vector3};
 use crate::model::arm::Arm;
 
-/// Kinetic energy with the rotors, `qd^T H qd / 2` \[J\].
+/// Returns the kinetic energy with the rotors, `qd^T H qd / 2` \[J\].
 pub fn kinetic_energy<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>) -> f64 {
     let rotations = parent_rotations(arm, q);
     let mut omega = Vector3::zeros();
@@ -25,7 +25,7 @@ pub fn kinetic_energy<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N
     0.5 * twice
 }
 
-/// Potential energy, zero for a centre of mass at the base origin \[J\].
+/// Returns the potential energy, zero for a centre of mass at the base origin \[J\].
 pub fn potential_energy<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> f64 {
     let poses = joint_poses(arm, q);
     let mut energy = 0.0;

@@ -1,5 +1,5 @@
 //! Inverse kinematics of the tip's position, for start poses and for checking whether a trajectory
-//! is within reach. Not used in the control loop.
+//! is within reach. The control loop does not use it.
 
 use crate::config::{Limits, Role};
 use crate::dynamics::{jacobian, tip_pose};
@@ -21,7 +21,7 @@ pub struct IkSolution<const N: usize> {
 }
 
 impl<const N: usize> IkSolution<N> {
-    /// Whether the point is reached to within a micrometre.
+    /// Returns whether the point is reached to within a micrometre.
     pub fn reached(&self) -> bool {
         self.distance_m < 1e-6
     }

@@ -12,7 +12,7 @@ use crate::math::{Matrix, Vector};
 use crate::model::arm::Arm;
 use crate::model::pose::Pose;
 
-/// Pose of every joint frame in the base, `base_from_joint`. `q` \[rad\].
+/// Returns the pose of every joint frame in the base, `base_from_joint`. `q` \[rad\].
 #[cfg_attr(not(debug_assertions), inline)]
 pub fn joint_poses<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> [Pose; N] {
     in_groups!(N, poses(arm, q))
@@ -24,7 +24,7 @@ fn poses<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> [Pose; 
     core::array::from_fn(|i| chain.frame(i).pose())
 }
 
-/// Pose of the tip in the base, `base_from_tip`. `q` \[rad\].
+/// Returns the pose of the tip in the base, `base_from_tip`. `q` \[rad\].
 #[cfg_attr(not(debug_assertions), inline)]
 pub fn tip_pose<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Pose {
     in_groups!(N, tip(arm, q))
@@ -35,7 +35,7 @@ fn tip<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Pose {
     Chain::<G>::new(arm, q).tip.pose()
 }
 
-/// Geometric Jacobian of the tip: linear rows first, then angular, base axes. Eq. (3.5).
+/// Returns the geometric Jacobian of the tip: linear rows first, then angular, base axes. Eq. (3.5).
 #[cfg_attr(not(debug_assertions), inline)]
 pub fn jacobian<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<6, N> {
     in_groups!(N, columns(arm, q))
@@ -47,7 +47,7 @@ fn columns<const N: usize, const G: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matri
     matrix(&joint_motions(&chain, chain.tip.origin))
 }
 
-/// `J' qd`: classical acceleration of the tip at `qdd = 0` \[m/s^2, rad/s^2\], base axes.
+/// Returns `J' qd`: classical acceleration of the tip at `qdd = 0` \[m/s^2, rad/s^2\], base axes.
 #[cfg_attr(not(debug_assertions), inline)]
 pub fn jacobian_dot_qd<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>) -> Vector<6> {
     in_groups!(N, bias_acceleration(arm, q, qd))

@@ -1,8 +1,8 @@
 //! Generalised momentum and the terms of its rate of change, for the external-torque observer.
 //!
 //! `p = H qd` obeys `p' = tau + tau_ext - D - G + dT/dq`, with `dT/dq = C^T qd`. Rotating joint `i`
-//! rotates everything beyond it relative to the velocity of its parent, so `dT/dq_i = -h_i . (S_i x
-//! v_i)` with `h_i` the momentum of all that joint `i` carries: one sweep out and one back, no
+//! rotates all links after it relative to the velocity of its parent, so `dT/dq_i = -h_i . (S_i x
+//! v_i)` with `h_i` the momentum of all links that joint `i` moves: one sweep out and one back, no
 //! matrix.
 
 use super::sweep::Sweep;
@@ -19,7 +19,7 @@ pub struct Momentum<const N: usize> {
     pub kinetic_gradient: Vector<N>,
 }
 
-/// Momentum and kinetic gradient at `q` \[rad\], `qd` \[rad/s\].
+/// Returns momentum and kinetic gradient at `q` \[rad\], `qd` \[rad/s\].
 #[cfg_attr(not(debug_assertions), inline)]
 pub fn momentum<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>) -> Momentum<N> {
     in_groups!(N, of_state(arm, q, qd))

@@ -1,6 +1,6 @@
 //! The torques as a linear function of the inertial parameters.
 //!
-//! Ten numbers a link, in its *link frame* (the one of the description): mass, first moments
+//! Each link has ten numbers in its *link frame* (the frame of the description): mass, first moments
 //! `m cx, m cy, m cz`, and inertia about the frame's origin `Ixx, Ixy, Iyy, Ixz, Iyz, Izz`.
 //!
 //! A link's force is linear in its ten numbers: each number has its own wrench, here in base axes
@@ -40,7 +40,7 @@ use crate::model::arm::Arm;
 /// zero if the link comes before the joint.
 pub type Regressor<const N: usize> = [[Vector<10>; N]; N];
 
-/// Joint-torque regressor: `rnea = Y p + armature qdd`, with [`parameters`] `p` and [`regressor_times`] for
+/// Returns the joint-torque regressor: `rnea = Y p + armature qdd`, with [`parameters`] `p` and [`regressor_times`] for
 /// the product. `q` \[rad\], `qd` \[rad/s\], `qdd` \[rad/s^2\].
 #[cfg_attr(not(debug_assertions), inline)]
 pub fn regressor<const N: usize>(
@@ -55,8 +55,8 @@ pub fn regressor<const N: usize>(
     whole
 }
 
-/// As [`regressor`], row by row: calls `put(joint, link, row)` for every joint and every link that
-/// it moves.
+/// Computes [`regressor`] row by row: calls `put(joint, link, row)` for every joint and every link that
+/// the joint moves.
 #[cfg_attr(not(debug_assertions), inline)]
 pub fn regressor_rows<const N: usize>(
     arm: &Arm<N>,
@@ -170,12 +170,12 @@ fn transposed_lanes([a, b, c, d]: [V3<Lanes>; 4]) -> V3<[Lanes; LANES]> {
     ]
 }
 
-/// Joint torques of links with these parameters, `Y p` \[N m\].
+/// Returns the joint torques of links with these parameters, `Y p` \[N m\].
 pub fn regressor_times<const N: usize>(y: &Regressor<N>, p: &[Vector<10>; N]) -> Vector<N> {
     Vector::from_fn(|i, _| y[i].iter().zip(p).map(|(row, p)| row.dot(p)).sum())
 }
 
-/// Inertial parameters of every link, ten each, in its link frame; the last link with the tool.
+/// Returns the ten inertial parameters of every link in its link frame; the last link includes the tool.
 pub fn parameters<const N: usize>(arm: &Arm<N>) -> [Vector<10>; N] {
     core::array::from_fn(|k| {
         let link = &arm.links[k];

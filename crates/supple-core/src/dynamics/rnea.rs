@@ -14,7 +14,7 @@ use crate::math::lanes::{Number, in_groups, joint_values};
 use crate::math::vec3::{V3, add, add_cross, add_rotated, add_scaled, dot, rotate, rotate_back};
 use crate::model::arm::Arm;
 
-/// Joint torques that give the accelerations `qdd`: `H qdd + C qd + G` \[N m\], without friction.
+/// Returns the joint torques for the accelerations `qdd`: `H qdd + C qd + G` \[N m\], without friction.
 ///
 /// `q` \[rad\], `qd` \[rad/s\], `qdd` \[rad/s^2\]. Eq. (3.1).
 #[cfg_attr(not(debug_assertions), inline)]
@@ -69,7 +69,7 @@ fn inverse_dynamics<const N: usize, const G: usize>(
     tau
 }
 
-/// Joint torques that hold the arm still against gravity, `G(q)` \[N m\].
+/// Returns the joint torques that hold the arm at rest against gravity, `G(q)` \[N m\].
 #[cfg_attr(not(debug_assertions), inline)]
 pub fn gravity<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Vector<N> {
     in_groups!(N, gravity_torques(arm, q))

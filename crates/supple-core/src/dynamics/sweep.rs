@@ -1,5 +1,5 @@
-//! One outward and one inward sweep that give every term of the law, in groups of joints:
-//! [`super::terms`] stores the result in matrices, the sum of the law reads it directly too.
+//! One outward and one inward sweep that compute every term of the law, in groups of joints:
+//! [`super::terms`] stores the result in matrices; the sum of the law also reads it directly.
 
 use super::chain::Chain;
 use super::crba::mass_columns;

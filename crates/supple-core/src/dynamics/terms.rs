@@ -22,7 +22,7 @@ pub struct Terms<const N: usize> {
     pub gravity: Vector<N>,
     /// Gradient of `G` by gravity \[kg m\]: `G` is the product of its transpose with gravity in base axes.
     pub gravity_gradient: Matrix<3, N>,
-    // Depends on velocity too.
+    // Depends also on velocity.
     /// `C qd + G` \[N m\].
     pub coriolis_gravity: Vector<N>,
     /// `J' qd`, classical acceleration of the tip at `qdd = 0` \[m/s^2, rad/s^2\].
@@ -65,7 +65,7 @@ fn swept<const N: usize, const G: usize>(
     fill(&Sweep::<G>::new(arm, q, qd), arm, qd, out);
 }
 
-/// Fills `out` from a sweep. Inlined: terms that nobody reads cost nothing.
+/// Fills `out` from a sweep. The function is inlined, so unused terms cost nothing.
 #[inline(always)]
 pub(crate) fn fill<const N: usize, const G: usize>(
     sweep: &Sweep<G>,

@@ -1,4 +1,4 @@
-//! The impedance law, Eq. (3.6): every term apart, or their sum.
+//! The impedance law, Eq. (3.6): separate terms, or their sum.
 //!
 //! With `Jb = H^-1 J^T (J H^-1 J^T)^-1`, the dynamically consistent inverse ([`crate::law::task`]):
 //!
@@ -9,18 +9,18 @@
 //! ```
 //!
 //! `F` is the measured force on the tip. `Xo''` is not in (3.6): it is the feed-forward `M Xo''` that
-//! (3.3) lacks. Held joints take no part in the task; they receive the model's coupling torque
-//! `H Jb (..)`, and their own stiff loop elsewhere.
+//! (3.3) lacks. The task does not use held joints; they receive the model's coupling torque
+//! `H Jb (..)` from this law, and the torque of their own stiff loop elsewhere.
 //!
-//! **With more active joints than directions**, motion that leaves the tip alone is damped by
-//! `-d N^T N qd`, `N = 1 - Jb J`: `J H^-1 N^T = 0`, so the tip feels none of it, and with `N` on both
-//! sides it takes energy however the arm moves (`-d N^T qd` alone can put some in). A further torque,
-//! as towards a posture, acts there as `N^T tau`. Near singular poses, where `Jb` is damped, the tip
-//! feels a part of both.
+//! **With more active joints than directions**, motion that does not move the tip is damped by
+//! `-d N^T N qd`, `N = 1 - Jb J`. Because `J H^-1 N^T = 0`, this torque causes no force on the tip, and because of `N` on both
+//! sides it takes energy from every motion of the arm (`-d N^T qd` alone can add energy). A further torque,
+//! for example towards a posture, acts in this null space as `N^T tau`. Near singular poses, where `Jb` is damped, a part of
+//! both torques acts on the tip.
 //!
-//! **Two forms of one law.** A `Form` receives each term as an acceleration of the tip, a force on it or
-//! joint torques. [`impedance`] maps each to the joints and keeps it; [`crate::impedance_torque`] adds up the
-//! accelerations and the forces and maps their sums, once.
+//! **Two implementations of one law.** A `TermSink` receives each term as an acceleration of the tip, a force on the tip or
+//! joint torques. [`impedance`] maps each term to the joints and keeps it; [`crate::impedance_torque`] adds up the
+//! accelerations and the forces and maps their sums once.
 
 use crate::config::{ApparentInertia, FrictionVelocity, Law, Role};
 use crate::dynamics::Terms;
@@ -37,7 +37,7 @@ pub use crate::law::task::{
 };
 pub use crate::law::torques::Torques;
 
-/// What the law is given besides the model and the task.
+/// Inputs of the law besides the model and the task.
 #[derive(Clone, Copy, Debug)]
 pub struct LawInput<'a, T, const N: usize, const D: usize = 3> {
     /// Reference and gains of the tip.
@@ -45,10 +45,10 @@ pub struct LawInput<'a, T, const N: usize, const D: usize = 3> {
     /// Joint velocities \[rad/s\].
     pub velocity_rad_per_s: &'a Vector<N>,
     /// Chosen inertia and measured force; `None` for the arm's own inertia.
-    pub apparent: Option<Apparent<D>>,
-    /// Friction of the joints to feed forward, and at which velocity.
+    pub apparent: Option<ChosenInertia<D>>,
+    /// Friction of the joints to feed forward, and the velocity at which it is evaluated.
     pub friction: Option<(&'a [Friction; N], FrictionVelocity)>,
-    /// Direction of each joint's dry friction, -1 to 1; `None`: that of the velocity.
+    /// Direction of each joint's dry friction, -1 to 1; `None`: the direction of the velocity.
     pub dry_direction: Option<&'a Vector<N>>,
     /// Share of the dry friction feed-forward to apply, 0 to 1.
     pub friction_share: f64,
@@ -58,12 +58,12 @@ pub struct LawInput<'a, T, const N: usize, const D: usize = 3> {
     pub inertial_feedforward: bool,
     /// Damping of each joint's motion in the null space \[N m s/rad\], zero or more.
     pub nullspace_damping_nm_s_per_rad: Vector<N>,
-    /// Torque to apply in the null space, as of a [`Posture`] \[N m\]; held joints get none of it.
+    /// Torque to apply in the null space, for example of a [`Posture`] \[N m\]; it does not act on held joints.
     pub nullspace_torque_nm: Option<&'a Vector<N>>,
 }
 
 impl<'a, T, const N: usize, const D: usize> LawInput<'a, T, N, D> {
-    /// The arm's own inertia with its feed-forward, no friction, nothing in the null space.
+    /// Creates inputs with the arm's own inertia and its feed-forward, without friction and without null-space torque.
     pub fn new(target: T, velocity_rad_per_s: &'a Vector<N>) -> Self {
         LawInput {
             target,
@@ -81,7 +81,7 @@ impl<'a, T, const N: usize, const D: usize> LawInput<'a, T, N, D> {
 }
 
 impl<'a, T, const N: usize> LawInput<'a, T, N> {
-    /// The configured law of the position, with the friction of the joints and the measured force on
+    /// Creates the inputs of the configured position law, with the friction of the joints and the measured force on
     /// the tip, base axes \[N\].
     #[inline(always)]
     pub fn of_law(
@@ -93,7 +93,7 @@ impl<'a, T, const N: usize> LawInput<'a, T, N> {
     ) -> Self {
         LawInput {
             apparent: match (law.inertia, tip_force_n) {
-                (ApparentInertia::Chosen(mass), Some(force)) => Apparent::new(&mass, force),
+                (ApparentInertia::Chosen(mass), Some(force)) => ChosenInertia::new(&mass, force),
                 _ => None,
             },
             friction: Some((friction, law.friction_velocity)),
@@ -104,21 +104,21 @@ impl<'a, T, const N: usize> LawInput<'a, T, N> {
     }
 }
 
-/// Friction feed-forward of an arm that is blocked: joints at rest have no viscous friction, and their dry
-/// friction is what it was when they came to rest, whatever the reference does.
+/// Friction feed-forward of a blocked arm: joints at rest have no viscous friction, and their dry
+/// friction keeps the value from when they came to rest, independent of the reference.
 #[derive(Clone, Copy, Debug)]
 pub struct HeldFriction<'a, const N: usize> {
     /// Joint velocities of the reference when the arm was blocked \[rad/s\].
     pub velocity_rad_per_s: &'a Vector<N>,
-    /// How much of the dry friction is that of these velocities, 0 to 1; the rest is that of the reference.
+    /// Fraction of the dry friction that is evaluated at these velocities, 0 to 1; the rest is evaluated at the reference.
     pub weight: f64,
     /// Share of the viscous friction to apply, 0 to 1.
     pub viscous_share: f64,
 }
 
 impl<const N: usize> HeldFriction<'_, N> {
-    /// What to add to the feed-forward of `joint` at `velocity_rad_per_s`, of whose dry part `dry_nm` a `share` is applied
-    /// \[N m\].
+    /// Returns the correction of the feed-forward of `joint` at `velocity_rad_per_s` \[N m\]; `share` is the applied fraction of
+    /// its dry part `dry_nm`.
     fn difference_nm(
         &self,
         friction: &Friction,
@@ -133,32 +133,32 @@ impl<const N: usize> HeldFriction<'_, N> {
     }
 }
 
-/// `M` of Eq. (3.3) as chosen, with the measured force on the tip that it needs.
+/// The chosen inertia `M` of Eq. (3.3), with the measured tip force that the law then needs.
 #[derive(Clone, Copy, Debug)]
-pub struct Apparent<const D: usize> {
+pub struct ChosenInertia<const D: usize> {
     inertia: Cholesky<D>,
     force: Vector<D>,
 }
 
-impl<const D: usize> Apparent<D> {
+impl<const D: usize> ChosenInertia<D> {
     /// `inertia` \[kg, kg m^2\] and the force on the tip \[N, N m\], base axes. `None` if `inertia` is not
     /// positive definite.
     pub fn new(inertia: &Matrix<D, D>, force: Vector<D>) -> Option<Self> {
-        Cholesky::new(inertia).map(|inertia| Apparent { inertia, force })
+        Cholesky::new(inertia).map(|inertia| ChosenInertia { inertia, force })
     }
 }
 
-/// The law, term by term. Adds nothing for held joints but the model's own terms.
+/// Returns the torque of each term of the law. Held joints have only the terms of the model.
 #[inline(always)]
 pub fn impedance<T: Target<D>, const N: usize, const D: usize>(
     roles: &[Role; N],
     terms: &Terms<N>,
     task: &Task<N, D>,
-    now: &LawInput<'_, T, N, D>,
+    input: &LawInput<'_, T, N, D>,
 ) -> Torques<N> {
     let tip = Tip {
         base_from_tip: terms.base_from_tip,
-        velocity: terms.jacobian.fixed_rows::<D>(0) * now.velocity_rad_per_s,
+        velocity: terms.jacobian.fixed_rows::<D>(0) * input.velocity_rad_per_s,
         bias: terms.jacobian_dot_qd.fixed_rows::<D>(0).into_owned(),
     };
     let torques = Torques {
@@ -166,13 +166,13 @@ pub fn impedance<T: Target<D>, const N: usize, const D: usize>(
         coriolis: terms.coriolis_gravity - terms.gravity,
         ..Torques::zeros()
     };
-    let mut apart = Apart {
+    let mut separate = SeparateTerms {
         task,
         mass_matrix: &terms.mass_matrix,
         torques,
     };
-    act(roles, task, &tip, now, &mut apart);
-    apart.torques
+    add_law_terms(roles, task, &tip, input, &mut separate);
+    separate.torques
 }
 
 /// State of the tip in the task's directions.
@@ -184,67 +184,70 @@ pub(super) struct Tip<const D: usize> {
     pub bias: Vector<D>,
 }
 
-/// What a term does.
+/// Effect of a term.
 pub(super) enum Effect<const N: usize, const D: usize> {
     /// Accelerates the tip: `H Jb a`.
     Acceleration(Vector<D>),
     /// Pushes the tip: `J^T f`.
     Force(Vector<D>),
-    /// Is opposed by a force, besides what the term has already: `-J^T f`.
+    /// Adds an opposing force to the term's torque: `-J^T f`.
     Reaction(Vector<D>),
-    /// Turns the joints.
+    /// Acts on the joints.
     Torque(Vector<N>),
 }
 
-/// The place of a term.
-pub(super) type Place<const N: usize> = fn(&mut Torques<N>) -> &mut Vector<N>;
+/// Field of [`Torques`] that holds a term.
+pub(super) type TermField<const N: usize> = fn(&mut Torques<N>) -> &mut Vector<N>;
 
-/// What the law's terms are turned into.
-pub(super) trait Form<const N: usize, const D: usize> {
+/// Receiver of the law's terms.
+pub(super) trait TermSink<const N: usize, const D: usize> {
     /// Adds a term.
-    fn add(&mut self, term: Place<N>, effect: Effect<N, D>);
+    fn add(&mut self, term: TermField<N>, effect: Effect<N, D>);
 }
 
-/// The terms of the law, except those of the model: `G + C qd`.
+/// Adds the terms of the law to `sink`, except those of the model: `G + C qd`.
 #[inline(always)]
-pub(super) fn act<T: Target<D>, F: Form<N, D>, const N: usize, const D: usize>(
+pub(super) fn add_law_terms<T: Target<D>, F: TermSink<N, D>, const N: usize, const D: usize>(
     roles: &[Role; N],
     task: &Task<N, D>,
     tip: &Tip<D>,
-    now: &LawInput<'_, T, N, D>,
-    form: &mut F,
+    input: &LawInput<'_, T, N, D>,
+    sink: &mut F,
 ) {
-    form.add(|t| &mut t.jacobian_rate, Acceleration(-tip.bias));
-    if now.inertial_feedforward {
-        form.add(|t| &mut t.inertial, Acceleration(now.target.acceleration()));
+    sink.add(|t| &mut t.jacobian_rate, Acceleration(-tip.bias));
+    if input.inertial_feedforward {
+        sink.add(
+            |t| &mut t.inertial,
+            Acceleration(input.target.acceleration()),
+        );
     }
-    let spring = now.target.spring(&tip.base_from_tip);
-    let damper = now.target.damper(&tip.velocity);
-    if let Some(Apparent { inertia, force }) = &now.apparent {
-        form.add(|t| &mut t.stiffness, Acceleration(inertia.solve(&spring)));
-        form.add(|t| &mut t.damping, Acceleration(inertia.solve(&damper)));
-        form.add(|t| &mut t.force, Acceleration(inertia.solve(force)));
-        form.add(|t| &mut t.force, Reaction(*force));
+    let spring = input.target.spring(&tip.base_from_tip);
+    let damper = input.target.damper(&tip.velocity);
+    if let Some(ChosenInertia { inertia, force }) = &input.apparent {
+        sink.add(|t| &mut t.stiffness, Acceleration(inertia.solve(&spring)));
+        sink.add(|t| &mut t.damping, Acceleration(inertia.solve(&damper)));
+        sink.add(|t| &mut t.force, Acceleration(inertia.solve(force)));
+        sink.add(|t| &mut t.force, Reaction(*force));
     } else {
-        form.add(|t| &mut t.stiffness, Force(spring));
-        form.add(|t| &mut t.damping, Force(damper));
+        sink.add(|t| &mut t.stiffness, Force(spring));
+        sink.add(|t| &mut t.damping, Force(damper));
     }
     let is_active = |i: usize| roles[i] == Role::Active;
-    if let Some((friction, at)) = now.friction {
-        let reference = task.inverse * now.target.velocity();
+    if let Some((friction, at)) = input.friction {
+        let reference = task.inverse * input.target.velocity();
         let feed_forward = |i: usize, _| {
             let velocity = match at {
-                FrictionVelocity::Measured if is_active(i) => now.velocity_rad_per_s[i],
+                FrictionVelocity::Measured if is_active(i) => input.velocity_rad_per_s[i],
                 _ => reference[i],
             };
-            let share = now.friction_share;
-            let torque_nm = match now.dry_direction {
+            let share = input.friction_share;
+            let torque_nm = match input.dry_direction {
                 Some(of) => friction[i].torque_in_direction_nm(velocity, of[i], share),
                 None => friction[i].torque_with_dry_share_nm(velocity, share),
             };
-            match &now.held_friction {
+            match &input.held_friction {
                 Some(held) => {
-                    let dry_nm = match now.dry_direction {
+                    let dry_nm = match input.dry_direction {
                         Some(of) => friction[i].dry_size_nm(velocity) * of[i],
                         None => friction[i].dry_torque_nm(velocity),
                     };
@@ -253,36 +256,36 @@ pub(super) fn act<T: Target<D>, F: Form<N, D>, const N: usize, const D: usize>(
                 None => torque_nm,
             }
         };
-        form.add(|t| &mut t.friction, Torque(Vector::from_fn(feed_forward)));
+        sink.add(|t| &mut t.friction, Torque(Vector::from_fn(feed_forward)));
     }
     if N > D && count_active(roles) > D {
-        // The part of the joints' motion that moves the tip; the rest is free.
-        let tip_motion = task.inverse * (task.jacobian * now.velocity_rad_per_s);
+        // The part of the joints' motion that moves the tip; the rest is null-space motion.
+        let tip_motion = task.inverse * (task.jacobian * input.velocity_rad_per_s);
         let mut torque = Vector::zeros();
         for i in (0..N).filter(|i| is_active(*i)) {
-            let free_motion = now.velocity_rad_per_s[i] - tip_motion[i];
-            torque[i] = free_motion * -now.nullspace_damping_nm_s_per_rad[i];
+            let free_motion = input.velocity_rad_per_s[i] - tip_motion[i];
+            torque[i] = free_motion * -input.nullspace_damping_nm_s_per_rad[i];
         }
-        if let Some(more) = now.nullspace_torque_nm {
+        if let Some(more) = input.nullspace_torque_nm {
             for i in (0..N).filter(|i| is_active(*i)) {
                 torque[i] += more[i];
             }
         }
-        form.add(|t| &mut t.nullspace, Torque(torque));
-        form.add(|t| &mut t.nullspace, Reaction(task.inverse.tr_mul(&torque)));
+        sink.add(|t| &mut t.nullspace, Torque(torque));
+        sink.add(|t| &mut t.nullspace, Reaction(task.inverse.tr_mul(&torque)));
     }
 }
 
-/// Every term apart.
-struct Apart<'a, const N: usize, const D: usize> {
+/// Keeps the torque of each term.
+struct SeparateTerms<'a, const N: usize, const D: usize> {
     task: &'a Task<N, D>,
     mass_matrix: &'a Matrix<N, N>,
     torques: Torques<N>,
 }
 
-impl<const N: usize, const D: usize> Form<N, D> for Apart<'_, N, D> {
+impl<const N: usize, const D: usize> TermSink<N, D> for SeparateTerms<'_, N, D> {
     #[inline(always)]
-    fn add(&mut self, term: Place<N>, effect: Effect<N, D>) {
+    fn add(&mut self, term: TermField<N>, effect: Effect<N, D>) {
         let (task, term) = (self.task, term(&mut self.torques));
         match effect {
             Acceleration(a) => *term = self.mass_matrix * (task.inverse * a),

@@ -1,8 +1,8 @@
-//! Torque of what is learned, see [`crate::learned`].
+//! Torques of the learned terms, see [`crate::learned`].
 //!
-//! A payload at the tip, of mass `m` and first moment `h` (base axes), needs for the acceleration `a` of the tip and
-//! gravity `g` the force `m (a - g)` on the tip and the moment `h x (a - g)`; its rotation alone is neglected. Gravity
-//! turned by the small rotation vector `t` is `g + t x g`.
+//! A payload at the tip, of mass `m` and first moment `h` (base axes), needs the force `m (a - g)` on the tip and the moment
+//! `h x (a - g)` for the acceleration `a` of the tip and gravity `g`; the torque for its angular acceleration is neglected.
+//! Gravity rotated by the small rotation vector `t` is `g + t x g`.
 
 use crate::config::Limits;
 use crate::dynamics::Terms;
@@ -36,7 +36,7 @@ pub fn tilt_torque_nm<const N: usize>(
         .tr_mul(&tilt_rad.cross(gravity_m_per_s2))
 }
 
-/// What is learned, at one pose.
+/// The learned terms evaluated at one pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LearnedAtPose<const N: usize> {
     /// Torque that does not depend on the velocity \[N m\].
@@ -46,7 +46,7 @@ pub struct LearnedAtPose<const N: usize> {
 }
 
 impl<const N: usize> LearnedAtPose<N> {
-    /// Of `learned` at the pose `q` \[rad\] of `terms`, for a tip that accelerates by `acceleration_m_per_s2`.
+    /// Evaluates `learned` at the pose `q` \[rad\] of `terms`, for a tip with the acceleration `acceleration_m_per_s2`.
     pub fn new(
         learned: &LearnedTerms<N>,
         friction: &[Friction; N],
@@ -72,7 +72,7 @@ impl<const N: usize> LearnedAtPose<N> {
             let weights = MapWeights::new(q[i], lower, upper);
             static_nm[i] += weights.of(&learned.map[i].torque_nm);
             dry_nm[i] += weights.of(&learned.map[i].dry_nm);
-            // More friction than there is would be compensated.
+            // A larger reduction would make the total dry friction negative.
             dry_nm[i] = dry_nm[i].max(-friction.coulomb_nm);
         }
         LearnedAtPose { static_nm, dry_nm }
@@ -97,8 +97,8 @@ impl<const N: usize> LearnedAtPose<N> {
     }
 }
 
-/// The whole learned torque of each joint, within its bound \[N m\]: `change` and the share of it and of the `model`'s
-/// torque by which the drives fall short.
+/// Returns the total learned torque of each joint, within its bound \[N m\]: `change_nm`, plus the torque by which the drives
+/// fall short of `model_nm + change_nm`.
 pub fn learned_torque_nm<const N: usize>(
     learned: &LearnedTerms<N>,
     bounds: &LearnedBounds<N>,
@@ -108,7 +108,7 @@ pub fn learned_torque_nm<const N: usize>(
     let scale = &learned.parameters.torque_scale;
     Vector::from_fn(|i, _| {
         let whole = change_nm[i] + scale[i] * (model_nm[i] + change_nm[i]);
-        // A NaN stays one and becomes a fault.
+        // A NaN stays NaN and causes a fault later.
         whole.clamp(-bounds.torque_nm[i], bounds.torque_nm[i])
     })
 }

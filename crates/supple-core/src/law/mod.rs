@@ -1,4 +1,4 @@
-//! The impedance law for the tip's position or pose, and what it works on.
+//! The impedance law for the tip's position or pose, with its task, targets and torque terms.
 
 pub mod impedance;
 pub mod learned;

@@ -1,7 +1,7 @@
-//! The sum of the law's terms, from the joint angles on: as [`super::impedance`] by terms, but for
+//! The sum of the law's terms, computed from the joint angles: equal to the sum of the terms of [`super::impedance`], except for
 //! rounding.
 
-use super::impedance::{Effect, Form, LawInput, Place, Tip, act};
+use super::impedance::{Effect, LawInput, TermField, TermSink, Tip, add_law_terms};
 use super::target::Target;
 use super::task::{Task, count_active, square_task};
 use crate::config::Role;
@@ -11,22 +11,22 @@ use crate::math::lanes::{in_groups, joint_values, per_joint};
 use crate::model::arm::Arm;
 use core::array::from_fn;
 
-/// The law's joint torques as one sum \[N m\]. `q` \[rad\].
+/// Returns the law's joint torques as one sum \[N m\]; `q` are the joint angles \[rad\].
 ///
-/// Three joints, all active and away from singular poses, take a shorter way: `J^-1` gives their
-/// accelerations and inverse dynamics the torques, without a mass matrix.
+/// For an arm of three joints, all active and away from singular poses, a shorter computation applies: `J^-1` gives the joint
+/// accelerations, and inverse dynamics the torques, without a mass matrix.
 ///
-/// `None` if the mass matrix of the active joints is not positive definite (not tested on the shorter
-/// way), or if fewer than six joints are active for a pose.
+/// Returns `None` if the mass matrix of the active joints is not positive definite (the shorter computation does not test it), or
+/// if fewer than six joints are active for a pose.
 #[cfg_attr(not(debug_assertions), inline)]
 pub fn impedance_torque<T: Target<D>, const N: usize, const D: usize>(
     arm: &Arm<N>,
     roles: &[Role; N],
     q: &Vector<N>,
-    now: &LawInput<'_, T, N, D>,
+    input: &LawInput<'_, T, N, D>,
 ) -> Option<Vector<N>> {
     const { assert!(N >= D, "a task takes a joint for each direction") };
-    in_groups!(N, torque[T, D](arm, roles, q, now))
+    in_groups!(N, torque[T, D](arm, roles, q, input))
 }
 
 #[inline(always)]
@@ -34,56 +34,56 @@ fn torque<T: Target<D>, const D: usize, const N: usize, const G: usize>(
     arm: &Arm<N>,
     roles: &[Role; N],
     q: &Vector<N>,
-    now: &LawInput<'_, T, N, D>,
+    input: &LawInput<'_, T, N, D>,
 ) -> Option<Vector<N>> {
-    let sweep = Sweep::<G>::new(arm, q, now.velocity_rad_per_s);
+    let sweep = Sweep::<G>::new(arm, q, input.velocity_rad_per_s);
     if N == 3 && D == 3 && count_active(roles) == 3 {
         let columns = from_fn(|i| {
             let [x, y, z, ..] = joint_values(&sweep.motions, i);
             [x, y, z]
         });
         let Some(task) = square_task(columns) else {
-            return near_singular::<T, D, N, G>(arm, roles, q, now);
+            return near_singular::<T, D, N, G>(arm, roles, q, input);
         };
         let bias = first(sweep.tip_bias_acceleration::<N>());
-        let sum = Sum::new(roles, &task, &sweep, bias, now);
+        let sum = TermSum::new(roles, &task, &sweep, bias, input);
         let qdd = task.inverse * sum.acceleration;
         let force = task.jacobian.tr_mul(&sum.force);
         let torque = per_joint(&sweep.inverse_dynamics(arm, &qdd.data.0[0]));
         return Some(Vector::from(torque) + force + sum.torque);
     }
-    by_mass_matrix(arm, roles, &sweep, now)
+    by_mass_matrix(arm, roles, &sweep, input)
 }
 
-/// Any number of joints, by the mass matrix.
+/// Computes the torques of any number of joints with the mass matrix.
 #[inline(always)]
 fn by_mass_matrix<T: Target<D>, const D: usize, const N: usize, const G: usize>(
     arm: &Arm<N>,
     roles: &[Role; N],
     sweep: &Sweep<G>,
-    now: &LawInput<'_, T, N, D>,
+    input: &LawInput<'_, T, N, D>,
 ) -> Option<Vector<N>> {
     let mut terms = Terms::default();
-    fill(sweep, arm, now.velocity_rad_per_s, &mut terms);
+    fill(sweep, arm, input.velocity_rad_per_s, &mut terms);
     let task = Task::from_terms(&terms, roles)?;
     let bias = terms.jacobian_dot_qd.fixed_rows::<D>(0).into_owned();
-    let sum = Sum::new(roles, &task, sweep, bias, now);
+    let sum = TermSum::new(roles, &task, sweep, bias, input);
     let inertial = terms.mass_matrix * (task.inverse * sum.acceleration);
     let force = task.jacobian.tr_mul(&sum.force);
     Some(terms.coriolis_gravity + inertial + force + sum.torque)
 }
 
-/// Not inlined: this way is rare for three joints, and inlining it would slow down the common one.
+/// Not inlined: this branch is rare for three joints, and inlining it would slow down the common one.
 #[cold]
 #[inline(never)]
 fn near_singular<T: Target<D>, const D: usize, const N: usize, const G: usize>(
     arm: &Arm<N>,
     roles: &[Role; N],
     q: &Vector<N>,
-    now: &LawInput<'_, T, N, D>,
+    input: &LawInput<'_, T, N, D>,
 ) -> Option<Vector<N>> {
-    let sweep = Sweep::<G>::new(arm, q, now.velocity_rad_per_s);
-    by_mass_matrix(arm, roles, &sweep, now)
+    let sweep = Sweep::<G>::new(arm, q, input.velocity_rad_per_s);
+    by_mass_matrix(arm, roles, &sweep, input)
 }
 
 /// The first `D` of six numbers.
@@ -93,39 +93,39 @@ fn first<const D: usize>(six: [f64; 6]) -> Vector<D> {
 }
 
 /// The terms added up before they are mapped to the joints.
-struct Sum<const N: usize, const D: usize> {
+struct TermSum<const N: usize, const D: usize> {
     acceleration: Vector<D>,
     force: Vector<D>,
     torque: Vector<N>,
 }
 
-impl<const N: usize, const D: usize> Sum<N, D> {
+impl<const N: usize, const D: usize> TermSum<N, D> {
     #[inline(always)]
     fn new<T: Target<D>, const G: usize>(
         roles: &[Role; N],
         task: &Task<N, D>,
         sweep: &Sweep<G>,
         bias: Vector<D>,
-        now: &LawInput<'_, T, N, D>,
+        input: &LawInput<'_, T, N, D>,
     ) -> Self {
         let tip = Tip {
             base_from_tip: sweep.chain.tip.pose(),
             velocity: first(sweep.motion.tip_rate::<N>()),
             bias,
         };
-        let mut sum = Sum {
+        let mut sum = TermSum {
             acceleration: Vector::zeros(),
             force: Vector::zeros(),
             torque: Vector::zeros(),
         };
-        act(roles, task, &tip, now, &mut sum);
+        add_law_terms(roles, task, &tip, input, &mut sum);
         sum
     }
 }
 
-impl<const N: usize, const D: usize> Form<N, D> for Sum<N, D> {
+impl<const N: usize, const D: usize> TermSink<N, D> for TermSum<N, D> {
     #[inline(always)]
-    fn add(&mut self, _: Place<N>, effect: Effect<N, D>) {
+    fn add(&mut self, _: TermField<N>, effect: Effect<N, D>) {
         match effect {
             Effect::Acceleration(a) => self.acceleration += a,
             Effect::Force(force) => self.force += force,

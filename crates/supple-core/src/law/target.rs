@@ -1,4 +1,4 @@
-//! What the law wants of the tip: reference and gains of its position, or of its pose.
+//! Target of the law: reference and gains of the tip's position, or of its pose.
 //!
 //! **Orientation.** With the rotation from the tip to its reference by `angle` about the unit vector `a`,
 //! a stiffness `K` about the base axes stores the energy `(1 - cos(angle)) a^T K a`, and its torque on the
@@ -144,7 +144,7 @@ impl PoseGains {
         }
     }
 
-    /// Whether every matrix is finite, symmetric and, to rounding, positive semi-definite.
+    /// Returns whether every matrix is finite, symmetric and, to rounding, positive semi-definite.
     pub fn is_passive(&self) -> bool {
         [
             &self.stiffness_n_per_m,
@@ -159,7 +159,7 @@ impl PoseGains {
     }
 }
 
-/// Rounding of the minimum eigenvalue of a gain matrix, relative to its maximum.
+/// Tolerance for a negative minimum eigenvalue of a gain matrix due to rounding, relative to its maximum eigenvalue.
 pub(crate) const EIGENVALUE_ROUNDING: f64 = 1e-8;
 
 /// Minimum and maximum eigenvalue of a symmetric matrix; `None` if it is not symmetric or not finite.
@@ -212,8 +212,8 @@ impl Target<6> for PoseTarget<'_> {
     }
 }
 
-/// Torque of the stiffness \[N m/rad\], symmetric, from the orientation `found` towards `wanted` \[N m\]; base
-/// axes.
+/// Returns the torque of a symmetric stiffness from the orientation `found` towards `wanted`, base axes
+/// \[N m\].
 #[inline]
 pub fn orientation_torque(
     stiffness_nm_per_rad: &Matrix3<f64>,

@@ -1,9 +1,9 @@
 //! The tip's task on the active joints: `D` = 3 directions for its position, 6 for its pose.
 //!
 //! [`Task`] holds the task's Jacobian and the dynamically consistent inverse `Jb = H^-1 J^T A^-1`,
-//! `A = J H^-1 J^T`. Joints that are held take no part: their columns of `J` are zero and their rows
-//! of `H` are the identity in `Jb`. With as many active joints as directions `Jb` is `J^-1`; for three
-//! it is computed so, independent of the mass matrix.
+//! `A = J H^-1 J^T`. Held joints do not belong to the task: their columns of `J` are zero, and in `Jb` their rows
+//! of `H` are those of the identity. With as many active joints as directions `Jb` equals `J^-1`; for three
+//! directions it is computed as `J^-1`, independent of the mass matrix.
 //!
 //! **Near singular poses** the position's `A` is damped: `A + f(sigma) / m_max I`, with `sigma` the
 //! smallest singular value of the active Jacobian, `f = (1 - (sigma / 0.18)^2)^2` below 0.18 and zero
@@ -43,7 +43,7 @@ pub fn singularity_damping_per_kg(sigma_m: f64) -> f64 {
     f * f / MAX_TASK_MASS_KG
 }
 
-/// Pivot `i` of the pose's mobility, damped.
+/// Returns the damped pivot `i` of the pose's mobility matrix.
 #[inline]
 fn damped_pivot(i: usize, pivot: f64) -> f64 {
     let max_mass_or_inertia = if i < 3 {
@@ -69,7 +69,7 @@ pub struct Task<const N: usize, const D: usize = 3> {
     pub inverse: Matrix<N, D>,
     /// Smallest singular value of the position's rows of `jacobian` \[m\].
     pub min_singular_value_m: f64,
-    /// Near a singular pose: the inverse is damped.
+    /// Whether the inverse is damped, because the pose is near a singular one.
     pub is_damped: bool,
 }
 
@@ -151,7 +151,7 @@ impl<const N: usize, const D: usize> Task<N, D> {
         };
         let inverse = match three_joints {
             Some(joints) if D == 3 && damping == 0.0 => {
-                // The inverse does not use the mass matrix, but one that is not positive definite is rejected all the same.
+                // The inverse does not use the mass matrix, but a matrix that is not positive definite is rejected here too.
                 if !is_positive_definite_3(mass_matrix, joints) {
                     return None;
                 }
@@ -198,7 +198,7 @@ pub(crate) fn square_task<const N: usize, const D: usize>(
     })
 }
 
-/// `J H^-1 J^T + damping`, the lower triangle alone; the rest stays zero.
+/// Returns the lower triangle of `J H^-1 J^T + damping`; the other elements are zero.
 #[inline(always)]
 fn lower_product<const N: usize, const D: usize>(
     jacobian: &Matrix<D, N>,
@@ -257,7 +257,7 @@ pub(crate) fn count_active<const N: usize>(roles: &[Role; N]) -> usize {
     roles.iter().filter(|role| **role == Role::Active).count()
 }
 
-/// The active joints, where they are three: as many as the position has directions.
+/// Returns the active joints if their number is three, the number of directions of a position.
 #[inline]
 fn three_active<const N: usize>(roles: &[Role; N]) -> Option<[usize; 3]> {
     let mut joints = [0; 3];

@@ -1,5 +1,5 @@
-//! The terms of the joint torque. The list below declares each of them once: the struct, its names, and what records
-//! and logs hold of it follow from the list.
+//! The terms of the joint torque. The list below declares each term once; the struct, its names, and its fields in records
+//! and logs are derived from the list.
 
 use crate::math::Vector;
 use crate::record::{Pack, Recorded, Shape, Term, Unpack};
@@ -90,7 +90,7 @@ impl<const N: usize> Torques<N> {
         sum
     }
 
-    /// `K` and `B` together: what the paper calls the PD torque \[N m\].
+    /// Sum of stiffness and damping, the PD torque of the paper \[N m\].
     pub fn feedback(&self) -> Vector<N> {
         self.stiffness + self.damping
     }

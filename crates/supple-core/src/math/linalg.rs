@@ -87,10 +87,10 @@ const MIN_ROOT_COEFFICIENTS: [f64; 19] = [
     1.568_610_274_461_335_5e-11,
 ];
 
-/// Whether all singular values of a 3 x `N` matrix, given by columns, are above `bound`, to a rounding of
+/// Returns whether all singular values of a 3 x `N` matrix, given by columns, are above `bound`, up to a rounding of
 /// their squares.
 ///
-/// Sylvester's criterion: all leading minors of `J J^T - bound^2` are positive. Much cheaper than
+/// This is Sylvester's criterion: all leading minors of `J J^T - bound^2` are positive. It is much cheaper than
 /// [`min_singular_value`].
 #[inline]
 pub fn singular_values_exceed<const N: usize>(j: &[[f64; 3]; N], bound: f64) -> bool {
@@ -102,8 +102,8 @@ pub fn singular_values_exceed<const N: usize>(j: &[[f64; 3]; N], bound: f64) -> 
     (xx > 0.0) & (minor > 0.0) & (determinant > 0.0)
 }
 
-/// Whether the three rows and columns `at` of a symmetric matrix are positive definite by themselves, by their
-/// leading minors. The lower triangle is read.
+/// Returns whether the submatrix of the three rows and columns `at` of a symmetric matrix is positive definite, by its
+/// leading minors. Reads the lower triangle.
 #[inline]
 pub(crate) fn is_positive_definite_3<const N: usize>(a: &Matrix<N, N>, at: [usize; 3]) -> bool {
     let [x, y, z] = at;
@@ -166,7 +166,7 @@ fn gram_3<const N: usize>(j: &[[f64; 3]; N]) -> [f64; 6] {
 ///
 /// Near zero the error is about 1e-8 times the largest singular value, and up to 3e-4 times it if
 /// two vanish together: sufficient to schedule damping, not to determine the rank.
-/// Inlined: a value that nobody reads costs nothing.
+/// The function is inlined, so an unused value costs nothing.
 #[inline(always)]
 pub fn min_singular_value<const N: usize>(j: &Matrix<3, N>) -> f64 {
     let [xx, xy, yy, xz, yz, zz] = gram_3(&j.data.0);

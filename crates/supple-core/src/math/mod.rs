@@ -18,7 +18,7 @@ pub use nalgebra::{Matrix3, Vector3};
 
 pub use libm::{acos, atan2, cos, exp, fabs as abs, log, sin};
 
-/// Square root, correctly rounded.
+/// Returns the square root, correctly rounded.
 ///
 /// `libm`'s square root compiles to a legacy SSE instruction. Mixed with AVX code it causes
 /// transition penalties: a step took 25 % longer.
@@ -31,13 +31,13 @@ pub fn sqrt(x: f64) -> f64 {
     }
 }
 
-/// Sine and cosine of an angle in radians.
+/// Returns sine and cosine of an angle in radians.
 #[inline]
 pub fn sin_cos(angle_rad: f64) -> (f64, f64) {
     libm::sincos(angle_rad)
 }
 
-/// `true` when every entry is a finite number.
+/// Returns whether every entry is a finite number.
 #[inline]
 pub fn all_finite<const R: usize, const C: usize>(m: &Matrix<R, C>) -> bool {
     m.iter().all(|x| x.is_finite())
@@ -61,7 +61,7 @@ pub fn smooth_step(x: f64) -> (f64, f64, f64) {
     }
 }
 
-/// Matrix of the cross product: `skew(a) * b == a.cross(&b)`.
+/// Returns the matrix of the cross product: `skew(a) * b == a.cross(&b)`.
 #[inline]
 pub fn skew(a: &Vector3<f64>) -> Matrix3<f64> {
     Matrix3::new(0.0, -a.z, a.y, a.z, 0.0, -a.x, -a.y, a.x, 0.0)

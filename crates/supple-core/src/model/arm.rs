@@ -26,40 +26,40 @@ pub struct Joint {
     pub armature_kg_m2: f64,
 }
 
-/// Why an arm could not be built. Joints are counted from 0.
+/// Error of building an arm. Joints are counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ArmError {
     /// The link moved by this joint is not a physical body.
     Body {
         /// Joint index.
         joint: usize,
-        /// What is wrong.
+        /// Problem.
         error: BodyError,
     },
     /// The tool is not a physical body.
     Tool(BodyError),
-    /// The joint axis is not a unit vector: its length.
+    /// The joint axis is not a unit vector.
     Axis {
         /// Joint index.
         joint: usize,
         /// Length found.
         length: f64,
     },
-    /// Rotor inertia negative or not finite \[kg m^2\].
+    /// The rotor inertia is negative or not finite \[kg m^2\].
     Armature {
         /// Joint index.
         joint: usize,
         /// Value found.
         value: f64,
     },
-    /// A transform that is not a finite rigid motion.
+    /// A transform is not a finite rigid motion.
     Pose {
         /// Joint index; `N` for the tip.
         joint: usize,
         /// The first entry that is not finite, or the deviation of the rotation from orthogonality.
         value: f64,
     },
-    /// A gravity entry that is not finite \[m/s^2\].
+    /// A component of gravity is not finite \[m/s^2\].
     Gravity(f64),
 }
 
@@ -200,28 +200,28 @@ impl<const N: usize> Arm<N> {
         Ok(arm)
     }
 
-    /// The links in their joint frames; the last one includes the tool.
+    /// Returns the links in their joint frames; the last link includes the tool.
     pub fn links(&self) -> &[Link; N] {
         &self.links
     }
 
-    /// Acceleration of free fall in base coordinates \[m/s^2\].
+    /// Returns the acceleration of free fall in base coordinates \[m/s^2\].
     pub fn gravity(&self) -> Vector3<f64> {
         self.gravity
     }
 
-    /// Rotor inertia of each joint \[kg m^2\].
+    /// Returns the rotor inertia of each joint \[kg m^2\].
     pub fn armature(&self) -> Vector<N> {
         self.armature
     }
 
-    /// Joint frame `i` in joint frame `i - 1` (the base for `i = 0`) at `q = 0`; the joint rotates
+    /// Returns the pose of joint frame `i` in joint frame `i - 1` (the base for `i = 0`) at `q = 0`; the joint rotates
     /// about its z axis.
     pub fn parent_from_joint(&self, i: usize) -> Pose {
         self.links[i].parent_from_joint
     }
 
-    /// Joint frame `i` in joint frame `i - 1` at angle `q_rad`.
+    /// Returns the pose of joint frame `i` in joint frame `i - 1` at angle `q_rad`.
     pub fn parent_from_joint_at(&self, i: usize, q_rad: f64) -> Pose {
         let (s, c) = sin_cos(q_rad);
         let pose = self.links[i].parent_from_joint;
@@ -231,17 +231,17 @@ impl<const N: usize> Arm<N> {
         }
     }
 
-    /// Rotation of joint frame `i` in link frame `i`: `z` is the joint axis in the link frame.
+    /// Returns the rotation of joint frame `i` in link frame `i`: `z` is the joint axis in the link frame.
     pub fn link_from_joint(&self, i: usize) -> Matrix3<f64> {
         self.links[i].link_from_joint
     }
 
-    /// Link `i` (the last one with the tool) in joint frame `i`.
+    /// Returns the body of link `i` in joint frame `i`; the last link includes the tool.
     pub fn body(&self, i: usize) -> Body {
         self.links[i].body()
     }
 
-    /// Tip frame in the last joint frame.
+    /// Returns the pose of the tip frame in the last joint frame.
     pub fn joint_from_tip(&self) -> Pose {
         self.joint_from_tip
     }

@@ -5,7 +5,7 @@ use crate::math::{Matrix3, Vector3, abs};
 use crate::model::pose::Pose;
 use core::fmt;
 
-/// Relative tolerance for rounded inertias on the bound, such as those of a thin plate.
+/// Relative tolerance for rounded inertias at the bound, such as the inertia of a thin plate.
 const TRIANGLE_SLACK: f64 = 1e-6;
 
 /// A rigid body in some frame.
@@ -19,16 +19,16 @@ pub struct Body {
     pub inertia_kg_m2: Matrix3<f64>,
 }
 
-/// Why a body is not physical. Carries the offending value.
+/// Reason why a body is not physical, with the invalid value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum BodyError {
-    /// A mass that is not a positive finite number \[kg\].
+    /// The mass is not a positive finite number \[kg\].
     Mass(f64),
-    /// A centre of mass with an entry that is not finite \[m\].
+    /// A coordinate of the centre of mass is not finite \[m\].
     CentreOfMass(f64),
-    /// An inertia entry that is not finite \[kg m^2\].
+    /// An entry of the inertia is not finite \[kg m^2\].
     InertiaEntry(f64),
-    /// An inertia that is not symmetric: the two entries \[kg m^2\].
+    /// The inertia is not symmetric; the values are the two entries \[kg m^2\].
     Asymmetric(f64, f64),
     /// The smallest principal moment is not positive \[kg m^2\].
     NotPositive(f64),
@@ -71,9 +71,9 @@ impl fmt::Display for BodyError {
 impl core::error::Error for BodyError {}
 
 impl Body {
-    /// A solid ball (a point mass would have no inertia).
+    /// Returns a solid ball (a point mass would have no inertia).
     ///
-    /// `mass_kg` and `radius_m` positive, centre at `com_m`.
+    /// `mass_kg` and `radius_m` are positive; the centre is at `com_m`.
     pub fn ball(mass_kg: f64, radius_m: f64, com_m: Vector3<f64>) -> Body {
         Body {
             mass_kg,
@@ -107,7 +107,7 @@ impl Body {
         if scale == 0.0 {
             return Err(BodyError::NotPositive(0.0));
         }
-        // Normalised first, because the eigenvalue computation uses third powers of the entries.
+        // The inertia is normalised first, because the eigenvalue computation uses third powers of the entries.
         let [min_moment, mid_moment, max_moment] =
             symmetric_eigenvalues(&(inertia / scale)).map(|i| i * scale);
         if min_moment <= 0.0 {
@@ -122,7 +122,7 @@ impl Body {
         Ok(())
     }
 
-    /// The same body expressed in frame `a`; `self` is given in frame `b`.
+    /// Returns the same body in frame `a`; `self` is given in frame `b`.
     pub fn expressed_in(&self, a_from_b: &Pose) -> Body {
         let r = &a_from_b.rotation;
         Body {
@@ -132,7 +132,7 @@ impl Body {
         }
     }
 
-    /// The body of two bodies in the same frame, rigidly connected.
+    /// Returns the body that consists of two rigidly connected bodies in the same frame.
     pub fn merged(&self, other: &Body) -> Body {
         let mass_kg = self.mass_kg + other.mass_kg;
         let com_m = (self.com_m * self.mass_kg + other.com_m * other.mass_kg) / mass_kg;
@@ -144,13 +144,13 @@ impl Body {
         }
     }
 
-    /// Inertia about the origin of the frame \[kg m^2\].
+    /// Returns the inertia about the origin of the frame \[kg m^2\].
     pub fn inertia_about_origin(&self) -> Matrix3<f64> {
         self.inertia_kg_m2 + steiner(self.mass_kg, &self.com_m)
     }
 }
 
-/// Inertia about the origin of a point mass at `r`.
+/// Returns the inertia about the origin of a point mass at `r`.
 pub(crate) fn steiner(mass_kg: f64, r: &Vector3<f64>) -> Matrix3<f64> {
     (Matrix3::identity() * r.dot(r) - r * r.transpose()) * mass_kg
 }

@@ -5,33 +5,34 @@
 //! p(x) = 2 x - sign(x) x^2  for |x| <= 1,   sign(x) beyond
 //! ```
 //!
-//! After a reversal real dry friction turns round over a travel `d` (presliding), whatever the velocity. Where `d` is known,
+//! After a reversal, real dry friction reverses over a distance `d` (presliding), independent of the velocity. If `d` is known,
 //! the law replaces `p` by a state that follows the reference (Dahl 1968):
 //!
 //! ```text
 //! p' = v (1 - p sign(v)) / d
 //! ```
 //!
-//! Gears add dry friction in proportion to a torque, `L |tau|`: that which the joint carries, or that of the motor. The latter is
-//! `tau = g +- S` at a load `g`; friction is then greater where the motor drives the load than where the load drives the motor.
+//! Gears add dry friction in proportion to a torque, `L |tau|`: the load torque of the joint, or the torque of the motor. The
+//! motor torque is `tau = g +- S` at a load `g`; friction is then greater if the motor drives the load than if the load drives
+//! the motor.
 //!
-//! As printed, the inner branch of (3.2) reads `S/delta (sign(v) v^2/delta + 2 v)`; at `|v| =
-//! delta` that is `3 S` where the outer branch is `S`. With the opposite sign of the parabola,
+//! As printed, the inner branch of (3.2) is `S/delta (sign(v) v^2/delta + 2 v)`; at `|v| =
+//! delta` it has the value `3 S`, while the outer branch has the value `S`. With the opposite sign of the parabola,
 //! value and slope are continuous: `D` is continuously differentiable in `v`.
 
 use crate::math::{abs, exp};
 use core::fmt;
 
-/// Greatest `load_coefficient`: with more, a gear could hardly be turned from its output.
+/// Maximum `load_coefficient`: with a greater coefficient, a torque at the output of the gear could hardly move it.
 pub const MAX_LOAD_COEFFICIENT: f64 = 0.5;
 
 /// The torque in proportion to which a gear adds dry friction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LoadTorque {
-    /// That which the joint carries.
+    /// Load torque of the joint.
     #[default]
     Joint,
-    /// That of the motor, which has to overcome friction as well.
+    /// Torque of the motor, which also has to overcome friction.
     Motor,
 }
 
@@ -51,19 +52,19 @@ pub struct Friction {
     pub offset_nm: f64,
     /// `delta`, half-width of the band of (3.2) in which friction is a parabola \[rad/s\], positive.
     pub band_rad_per_s: f64,
-    /// `d`, travel over which dry friction turns round after a reversal \[rad\]; zero: its direction is that of the
-    /// velocity.
+    /// `d`, distance over which dry friction reverses after a reversal of motion \[rad\]; zero: dry friction has the direction of
+    /// the velocity.
     pub presliding_rad: f64,
     /// `L`, dry friction that a torque on the gear adds, per torque, 0 to 0.5; zero: friction does not depend on the load.
     pub load_coefficient: f64,
-    /// Which torque that is.
+    /// The torque to which `load_coefficient` refers.
     pub load_torque: LoadTorque,
-    /// Size of that torque at which dry friction is `coulomb_nm` and `breakaway_nm` \[N m\], zero or more;
+    /// Magnitude of that torque at which dry friction is `coulomb_nm` and `breakaway_nm` \[N m\], zero or more;
     /// `load_coefficient` times it is at most `coulomb_nm`.
     pub coulomb_at_nm: f64,
 }
 
-/// The entry of a [`Friction`] that is not physical, with its value.
+/// An entry of a [`Friction`] that is not physical, with its value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrictionError {
     /// Name of the entry, as in [`Friction`].
@@ -87,7 +88,7 @@ impl fmt::Display for FrictionError {
 impl core::error::Error for FrictionError {}
 
 impl Friction {
-    /// No friction at all.
+    /// No friction.
     pub const NONE: Friction = Friction {
         viscous_nm_s_per_rad: 0.0,
         coulomb_nm: 0.0,
@@ -101,7 +102,7 @@ impl Friction {
         coulomb_at_nm: 0.0,
     };
 
-    /// Viscous and Coulomb friction, the paper's `V` and `S`, with the default band and no Stribeck
+    /// Returns viscous and Coulomb friction, the paper's `V` and `S`, with the default band and no Stribeck
     /// effect.
     pub const fn coulomb(viscous_nm_s_per_rad: f64, coulomb_nm: f64) -> Friction {
         Friction {
@@ -112,7 +113,7 @@ impl Friction {
         }
     }
 
-    /// Rejects friction that would feed energy into the joint.
+    /// Rejects friction that would add energy to the joint.
     ///
     /// # Errors
     /// The first invalid entry.
@@ -168,15 +169,15 @@ impl Friction {
         )
     }
 
-    /// The friction in sliding while the joint carries `load_nm` \[N m\]: its dry part is the mean of both directions, half
-    /// of their difference is in the offset. The Stribeck effect is in proportion to the dry part.
+    /// Returns the sliding friction while the joint carries `load_nm` \[N m\]: the dry part is the mean of both directions, and
+    /// half of their difference is added to the offset. The Stribeck effect is in proportion to the dry part.
     #[inline]
     pub fn at_load(&self, load_nm: f64) -> Friction {
         let (share, size_nm) = (self.load_coefficient, abs(load_nm));
         let unloaded_nm = self.coulomb_nm - share * self.coulomb_at_nm;
         let loaded_nm = unloaded_nm + share * size_nm;
-        // S = S_u + L |g + S| where the motor drives the load; S = S_u + L |g - S| where the load drives the motor or,
-        // if it is small, helps it.
+        // S = S_u + L |g + S| if the motor drives the load; S = S_u + L |g - S| if the load drives the motor or,
+        // if the load is small, assists it.
         let (driving_nm, driven_nm) = match self.load_torque {
             LoadTorque::Joint => (loaded_nm, loaded_nm),
             LoadTorque::Motor if size_nm > unloaded_nm => {
@@ -202,7 +203,7 @@ impl Friction {
         }
     }
 
-    /// `factor` times all of this friction, at `factor` times the load.
+    /// Returns `factor` times this friction, at `factor` times the load.
     pub fn scaled(&self, factor: f64) -> Friction {
         Friction {
             viscous_nm_s_per_rad: self.viscous_nm_s_per_rad * factor,
@@ -214,7 +215,7 @@ impl Friction {
         }
     }
 
-    /// The same with `factor` times its dry friction, zero or more.
+    /// Returns this friction with `factor` times its dry friction; `factor` is zero or more.
     pub fn with_dry_scaled(&self, factor: f64) -> Friction {
         Friction {
             coulomb_nm: self.coulomb_nm * factor,
@@ -224,21 +225,21 @@ impl Friction {
         }
     }
 
-    /// Uncertainty of the dry friction at `velocity_rad_per_s` \[N m\]: all of it at rest, where
-    /// stiction may act in either direction, and `relative_error` of it in fast sliding.
+    /// Returns the uncertainty of the dry friction at `velocity_rad_per_s` \[N m\]: the whole dry friction at rest, because
+    /// stiction may act in either direction, and the fraction `relative_error` of it in fast sliding.
     #[inline]
     pub fn uncertainty_nm(&self, velocity_rad_per_s: f64, relative_error: f64) -> f64 {
         let s = velocity_rad_per_s / self.stribeck_rad_per_s;
         self.coulomb_nm * relative_error + self.breakaway_nm * exp(-s * s)
     }
 
-    /// `D(v)`, the torque that overcomes friction at joint velocity `velocity_rad_per_s` \[N m\].
+    /// Returns `D(v)`, the torque that overcomes friction at joint velocity `velocity_rad_per_s` \[N m\].
     #[inline]
     pub fn torque_nm(&self, velocity_rad_per_s: f64) -> f64 {
         self.torque_with_dry_share_nm(velocity_rad_per_s, 1.0)
     }
 
-    /// `D(v)` with a fraction `share` of its dry part, 0 to 1 \[N m\].
+    /// Returns `D(v)` with a fraction `share` of its dry part, 0 to 1 \[N m\].
     #[inline]
     pub fn torque_with_dry_share_nm(&self, velocity_rad_per_s: f64, share: f64) -> f64 {
         self.viscous_nm_s_per_rad * velocity_rad_per_s
@@ -246,7 +247,7 @@ impl Friction {
             + self.dry_torque_nm(velocity_rad_per_s) * share
     }
 
-    /// `p(v / delta)`: the sign of the velocity, made continuous in the band; -1 to 1.
+    /// Returns `p(v / delta)`: the sign of the velocity, continuous in the band; -1 to 1.
     #[inline]
     pub fn direction(&self, velocity_rad_per_s: f64) -> f64 {
         let x = velocity_rad_per_s / self.band_rad_per_s;
@@ -257,14 +258,14 @@ impl Friction {
         }
     }
 
-    /// The dry part of `D(v)`: Coulomb torque with the Stribeck effect, parabolic in the band \[N
+    /// Returns the dry part of `D(v)`: Coulomb torque with the Stribeck effect, parabolic in the band \[N
     /// m\].
     #[inline]
     pub fn dry_torque_nm(&self, velocity_rad_per_s: f64) -> f64 {
         self.dry_size_nm(velocity_rad_per_s) * self.direction(velocity_rad_per_s)
     }
 
-    /// Size of the dry part of `D(v)`: Coulomb torque with the Stribeck effect \[N m\].
+    /// Returns the magnitude of the dry part of `D(v)`: Coulomb torque with the Stribeck effect \[N m\].
     #[inline]
     pub fn dry_size_nm(&self, velocity_rad_per_s: f64) -> f64 {
         let s = velocity_rad_per_s / self.stribeck_rad_per_s;
@@ -272,7 +273,7 @@ impl Friction {
         self.coulomb_nm + if dip > 0.0 { dip * exp(-s * s) } else { 0.0 }
     }
 
-    /// `D(v)` with dry friction in the given direction, -1 to 1, and a fraction `share` of it, 0 to 1 \[N m\].
+    /// Returns `D(v)` with dry friction in the given direction, -1 to 1, multiplied by `share`, 0 to 1 \[N m\].
     #[inline]
     pub fn torque_in_direction_nm(
         &self,
@@ -285,7 +286,8 @@ impl Friction {
             + self.dry_size_nm(velocity_rad_per_s) * direction * share
     }
 
-    /// The direction of the dry friction after `travel_rad` more, either way, from `direction`. Only with presliding.
+    /// Returns the direction of the dry friction after a further motion of `travel_rad`, which is signed, from `direction`.
+    /// Requires presliding.
     #[inline]
     pub fn direction_after(&self, direction: f64, travel_rad: f64) -> f64 {
         let to = 1.0_f64.copysign(travel_rad);

@@ -1,5 +1,5 @@
-//! What is learned of the model while the arm moves: changes of its parameters, and a map of the torque that they
-//! leave unexplained, per joint.
+//! Changes of the model that are learned while the arm moves: changes of its parameters, and for each joint a map of the torque
+//! that the parameters leave unexplained.
 //!
 //! With `v` the joint's velocity, `p` the direction of its motion ([`Friction::direction`]), `phi_k` splines over its
 //! angle and `model` the torque of the model, the torque of joint `i` grows by
@@ -14,14 +14,14 @@
 //! energy over a closed motion. The part `o` is dry friction; `S + S' + o` never falls below zero, so that the friction
 //! that it compensates is dissipative.
 //!
-//! All changes are bounded, see [`LearnedBounds`]. How they are estimated is not here.
+//! All changes are bounded, see [`LearnedBounds`]. The crate `supple-learning` estimates them.
 
 use crate::math::{Vector, Vector3, abs};
 use crate::model::friction::Friction;
 
-/// Coefficients of a joint's map in each of its two parts.
+/// Number of coefficients in each of the two parts of a joint's map.
 pub const MAP_KNOTS: usize = 16;
-/// Intervals of the joint's range: splines of second degree.
+/// Number of intervals of the joint's range; the splines are of second degree.
 const INTERVALS: usize = MAP_KNOTS - 2;
 
 /// Changes of the model's parameters; zero is the model itself.
@@ -31,15 +31,15 @@ pub struct LearnedParameters<const N: usize> {
     pub viscous_nm_s_per_rad: Vector<N>,
     /// Change of the Coulomb friction `S` \[N m\].
     pub coulomb_nm: Vector<N>,
-    /// Torque to add at every joint, whatever its motion \[N m\].
+    /// Torque to add at every joint, independent of its motion \[N m\].
     pub offset_nm: Vector<N>,
-    /// Share of the model's torque to add: what a drive falls short of its command.
+    /// Fraction of the model's torque to add: the fraction by which a drive falls short of its command.
     pub torque_scale: Vector<N>,
     /// Mass of a payload at the tip \[kg\]; negative if the tool is lighter than its model.
     pub payload_kg: f64,
     /// First moment of the payload in the tip frame \[kg m\].
     pub payload_moment_kg_m: Vector3<f64>,
-    /// Rotation vector by which gravity is turned, base axes \[rad\]. A turn about gravity itself has no effect.
+    /// Rotation vector by which gravity is rotated, base axes \[rad\]. A rotation about gravity itself has no effect.
     pub tilt_rad: Vector3<f64>,
 }
 
@@ -47,7 +47,7 @@ impl<const N: usize> LearnedParameters<N> {
     /// The numbers of an arm with `N` joints.
     pub const COUNT: usize = 4 * N + 7;
 
-    /// The model as it is.
+    /// No change of the model.
     pub fn zero() -> Self {
         LearnedParameters {
             viscous_nm_s_per_rad: Vector::zeros(),
@@ -112,12 +112,12 @@ impl JointMap {
         dry_nm: [0.0; MAP_KNOTS],
     };
 
-    /// All coefficients, `torque_nm` first.
+    /// Returns all coefficients, `torque_nm` first.
     pub fn coefficients(&self) -> impl Iterator<Item = &f64> {
         self.torque_nm.iter().chain(&self.dry_nm)
     }
 
-    /// As [`JointMap::coefficients`], to change them.
+    /// Returns mutable references to the coefficients, in the order of [`JointMap::coefficients`].
     pub fn coefficients_mut(&mut self) -> impl Iterator<Item = &mut f64> {
         self.torque_nm.iter_mut().chain(&mut self.dry_nm)
     }
@@ -133,7 +133,7 @@ pub struct MapWeights {
 }
 
 impl MapWeights {
-    /// At `q_rad`, for a joint with this range. Beyond the range the value at its end.
+    /// Evaluates the splines at `q_rad` for a joint with this range; beyond the range, at the end of the range.
     #[inline]
     pub fn new(q_rad: f64, lower_rad: f64, upper_rad: f64) -> MapWeights {
         let x = (q_rad - lower_rad) / (upper_rad - lower_rad) * INTERVALS as f64;
@@ -148,7 +148,7 @@ impl MapWeights {
         }
     }
 
-    /// Value of a part of a map.
+    /// Returns the value of a part of a map.
     #[inline]
     pub fn of(&self, coefficients: &[f64; MAP_KNOTS]) -> f64 {
         let [a, b, c] = self.weights;
@@ -158,7 +158,7 @@ impl MapWeights {
     }
 }
 
-/// Everything that is learned.
+/// All learned changes of a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LearnedTerms<const N: usize> {
     /// Changes of the parameters.
@@ -168,7 +168,7 @@ pub struct LearnedTerms<const N: usize> {
 }
 
 impl<const N: usize> LearnedTerms<N> {
-    /// The model as it is.
+    /// No change of the model.
     pub fn zero() -> Self {
         LearnedTerms {
             parameters: LearnedParameters::zero(),
@@ -190,9 +190,9 @@ impl<const N: usize> LearnedTerms<N> {
 
 /// Relative change of a friction parameter.
 const FRICTION_SHARE: f64 = 0.5;
-/// Share of a joint's torque limit: of an offset, and of a coefficient of the map.
+/// Offset, and coefficient of the map, as a fraction of the joint's torque limit.
 const OFFSET_SHARE: f64 = 0.02;
-/// Share of a joint's torque limit: of all learned torques together.
+/// Sum of all learned torques, as a fraction of the joint's torque limit.
 const TORQUE_SHARE: f64 = 0.05;
 /// Relative error of a torque constant.
 const TORQUE_SCALE: f64 = 0.05;
@@ -203,14 +203,14 @@ const PAYLOAD_M: f64 = 0.1;
 /// Tilt about each axis \[rad\].
 const TILT_RAD: f64 = 0.05;
 
-/// What learning may change at most, either way.
+/// Bounds of the magnitude of all learned changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LearnedBounds<const N: usize> {
-    /// Of each parameter.
+    /// Bound of each parameter.
     pub parameters: LearnedParameters<N>,
-    /// Of each coefficient of a joint's map \[N m\].
+    /// Bound of each coefficient of a joint's map \[N m\].
     pub map_nm: Vector<N>,
-    /// Of the whole learned torque of a joint \[N m\].
+    /// Bound of the total learned torque of a joint \[N m\].
     pub torque_nm: Vector<N>,
 }
 
@@ -221,13 +221,13 @@ pub struct OutOfBounds {
     pub entry: &'static str,
     /// Value found.
     pub value: f64,
-    /// Bound, either way.
+    /// Bound of the magnitude.
     pub bound: f64,
 }
 
 impl<const N: usize> LearnedBounds<N> {
-    /// For joints with this friction and these torque limits \[N m\]: half of each friction parameter, 2 % of the torque
-    /// limit as offset and in the map, 5 % of the torque constant, 0.25 kg at up to 0.1 m from the tip, 0.05 rad of
+    /// Returns the bounds for joints with this friction and these torque limits \[N m\]: half of each friction parameter, 2 % of
+    /// the torque limit as offset and in the map, 5 % of the torque constant, 0.25 kg at up to 0.1 m from the tip, 0.05 rad of
     /// tilt; in sum 5 % of the torque limit.
     pub fn new(friction: &[Friction; N], joint_torque_nm: &Vector<N>) -> Self {
         LearnedBounds {
@@ -247,7 +247,7 @@ impl<const N: usize> LearnedBounds<N> {
         }
     }
 
-    /// Rejects parameters beyond the bounds, and such that are not finite.
+    /// Rejects parameters that are beyond the bounds or not finite.
     ///
     /// # Errors
     /// The first such entry.

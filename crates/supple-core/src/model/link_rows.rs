@@ -1,4 +1,4 @@
-//! The links of an arm stored by rows, as [`crate::math::lanes`] needs them.
+//! The links of an arm stored by rows, the storage order of [`crate::math::lanes`].
 
 use crate::math::lanes::{LANES, Lanes, Rows};
 use crate::model::link::Link;

@@ -75,7 +75,7 @@ impl RippleTable {
         &self.lines[..self.count]
     }
 
-    /// Whether a part of the ripple is in proportion to the motor's torque.
+    /// Returns whether a part of the ripple is in proportion to the motor's torque.
     pub fn scales_with_torque(&self) -> bool {
         let scales = |line: &Harmonic| line.sine_share != 0.0 || line.cosine_share != 0.0;
         self.harmonics().iter().any(scales)

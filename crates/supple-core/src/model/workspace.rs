@@ -1,4 +1,4 @@
-//! Workspace limits of the tip: borders that it must not cross, and boxes (zones) with their own
+//! Workspace limits of the tip: borders that the tip must not cross, and boxes (zones) with their own
 //! speed and force limits.
 //!
 //! Before each border a margin with a spring-damper pushes the tip back. A violation faults only
@@ -41,9 +41,9 @@ pub struct Zone {
     pub lower_m: Vector3<f64>,
     /// Corner of the largest coordinates \[m\].
     pub upper_m: Vector3<f64>,
-    /// Tip speed in it that faults \[m/s\], positive; above 0.8 of it the tip is damped.
+    /// Tip speed in the zone that causes a fault \[m/s\], positive; above 0.8 times this speed the tip is damped.
     pub tip_speed_m_per_s: f64,
-    /// Observed force on the tip in it that faults \[N\], positive; it also limits the law's spring
+    /// Observed force on the tip in the zone that causes a fault \[N\], positive; it also limits the law's spring
     /// force.
     pub tip_force_n: f64,
 }
@@ -91,8 +91,8 @@ pub enum WorkspaceViolation {
 }
 
 impl Border {
-    /// Distance to the border, negative beyond it \[m\], and the direction towards it. For a box it
-    /// is measured along the axis on which the tip is furthest from it.
+    /// Returns the distance to the border, negative beyond it \[m\], and the direction towards it. The distance to a box
+    /// is measured along the axis on which the tip is furthest from the box.
     pub fn distance(&self, tip_m: &Vector3<f64>) -> (f64, Vector3<f64>) {
         match self {
             Border::Wall { normal, offset_m } => (offset_m - normal.dot(tip_m), *normal),
@@ -118,7 +118,7 @@ impl Border {
 }
 
 impl Zone {
-    /// Whether the tip is in the zone.
+    /// Returns whether the tip is in the zone.
     pub fn contains(&self, tip_m: &Vector3<f64>) -> bool {
         (0..3).all(|axis| (self.lower_m[axis]..=self.upper_m[axis]).contains(&tip_m[axis]))
     }
@@ -134,19 +134,19 @@ impl Workspace {
         damping_n_s_per_m: 0.0,
     };
 
-    /// Whether there are no borders and no zones.
+    /// Returns whether there are no borders and no zones.
     pub fn is_unbounded(&self) -> bool {
         self.borders[0].is_none() && self.zones[0].is_none()
     }
 
-    /// Index of the first border that a point is beyond, and the distance beyond it \[m\].
+    /// Returns the index of the first border that a point is beyond, and the distance beyond it \[m\].
     pub fn violated_border(&self, point_m: &Vector3<f64>) -> Option<(usize, f64)> {
         let borders = self.borders.iter().flatten().enumerate();
         let mut beyond = borders.map(|(index, border)| (index, -border.distance(point_m).0));
         beyond.find(|(_, by_m)| *by_m > 0.0)
     }
 
-    /// The first violation by the tip, if any.
+    /// Returns the first violation by the tip, if any.
     pub fn violation(
         &self,
         tip_m: &Vector3<f64>,
@@ -181,15 +181,15 @@ impl Workspace {
         None
     }
 
-    /// Depth of a point in the margin of a border, more than the margin beyond the border, and zero outside \[m\]; and the
-    /// direction towards the border.
+    /// Returns the depth of a point in the margin of a border \[m\], which is zero outside of the margin and exceeds the margin's
+    /// width beyond the border; and the direction towards the border.
     pub fn margin_depth_m(&self, border: &Border, tip_m: &Vector3<f64>) -> (f64, Vector3<f64>) {
         let (distance_m, towards) = border.distance(tip_m);
         ((self.margin_m - distance_m).max(0.0), towards)
     }
 
-    /// Spring-damper force of the border margins, and damping in zones \[N\], base axes. The spring of each border pushes
-    /// from this depth in its margin on \[m\].
+    /// Returns the spring-damper force of the border margins plus the damping in zones \[N\], base axes. The spring of each
+    /// border acts beyond the given depth in its margin \[m\].
     pub fn soft_force(
         &self,
         tip_m: &Vector3<f64>,
@@ -222,14 +222,14 @@ impl Workspace {
         force
     }
 
-    /// Maximum force of the law's spring at a point \[N\].
+    /// Returns the maximum force of the law's spring at a point \[N\].
     pub fn spring_limit_n(&self, tip_m: &Vector3<f64>) -> f64 {
         let zones = self.zones.iter().flatten();
         let here = zones.filter(|zone| zone.contains(tip_m));
         here.fold(f64::MAX, |limit, zone| limit.min(zone.tip_force_n))
     }
 
-    /// The first invalid entry: its name, its value and the requirement.
+    /// Returns the first invalid entry: its name, its value and the requirement.
     pub fn first_invalid(&self) -> Option<(&'static str, f64, &'static str)> {
         let finite = |v: &Vector3<f64>| v.iter().all(|x| x.is_finite() && abs(*x) <= 100.0);
         if !(self.margin_m > 0.0 && self.margin_m <= 1.0) {

@@ -25,7 +25,7 @@ pub enum Part {
 }
 
 impl fmt::Display for Column {
-    /// As `name`, `name.0`, `name.x` or `name.term.0`.
+    /// Writes `name`, `name.0`, `name.x` or `name.term.0`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.field)?;
         if let Some(term) = self.term {
@@ -57,7 +57,7 @@ pub enum Cell<'a> {
 }
 
 impl fmt::Display for Cell<'_> {
-    /// Numbers with the digits that read back as the same number; several of them separated by spaces.
+    /// Writes numbers with enough digits to read back the same number; several numbers are separated by spaces.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Cell::Flag(flag) => write!(f, "{}", u8::from(*flag)),

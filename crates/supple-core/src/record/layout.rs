@@ -3,7 +3,7 @@
 use super::text::Text;
 use crate::math::Vector;
 
-/// Type of one value.
+/// Type of one element of a field.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Element {
     /// True or false.
@@ -45,7 +45,7 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// Number of 64-bit words of a field of this shape, for an arm of `joints` joints.
+    /// Returns the number of 64-bit words of a field of this shape, for an arm of `joints` joints.
     pub const fn words(self, joints: usize) -> usize {
         match self {
             Shape::One(_) => 1,
@@ -69,7 +69,7 @@ pub struct Field {
     pub description: &'static str,
 }
 
-/// Number of 64-bit words of a record, for an arm of `joints` joints.
+/// Returns the number of 64-bit words of a record, for an arm of `joints` joints.
 pub const fn words_of(fields: &[Field], joints: usize) -> usize {
     let (mut sum, mut i) = (0, 0);
     while i < fields.len() {
@@ -232,7 +232,7 @@ pub struct List<const MAX: usize> {
 }
 
 impl<const MAX: usize> List<MAX> {
-    /// A list of the first `MAX` of these numbers.
+    /// Creates a list of the first `MAX` of these numbers.
     pub fn new(values: &[f64]) -> Self {
         let count = values.len().min(MAX);
         let mut list = List {
@@ -243,7 +243,7 @@ impl<const MAX: usize> List<MAX> {
         list
     }
 
-    /// The numbers.
+    /// Returns the numbers.
     pub fn values(&self) -> &[f64] {
         &self.values[..self.count]
     }

@@ -2,7 +2,7 @@
 
 use core::fmt::{self, Write};
 
-/// The longest beginning of `bytes` that is UTF-8.
+/// Returns the longest beginning of `bytes` that is UTF-8.
 pub fn valid_utf8(bytes: &[u8]) -> &str {
     let length = match core::str::from_utf8(bytes) {
         Ok(text) => return text,
@@ -19,7 +19,7 @@ pub struct Text {
 }
 
 impl Text {
-    /// Greatest length.
+    /// Maximum length.
     pub const MAX_BYTES: usize = 256;
 
     /// No text.
@@ -28,7 +28,7 @@ impl Text {
         bytes: [0; Text::MAX_BYTES],
     };
 
-    /// The value as [`fmt::Display`] writes it.
+    /// Creates the text that [`fmt::Display`] writes for `value`.
     pub fn from_display(value: &dyn fmt::Display) -> Text {
         let mut text = Text::EMPTY;
         // Writing stops at the last byte and never fails.
@@ -36,7 +36,7 @@ impl Text {
         text
     }
 
-    /// Text from untrusted bytes: cut before the first byte that is not UTF-8.
+    /// Creates a text from untrusted bytes, cut before the first byte that is not UTF-8.
     pub(super) fn from_utf8_lossy(bytes: &[u8; Text::MAX_BYTES], length: u64) -> Text {
         let length = usize::try_from(length).map_or(Text::MAX_BYTES, |n| n.min(Text::MAX_BYTES));
         let mut text = Text::EMPTY;
@@ -44,7 +44,7 @@ impl Text {
         text
     }
 
-    /// The text.
+    /// Returns the text.
     pub fn as_str(&self) -> &str {
         core::str::from_utf8(&self.bytes[..self.length]).unwrap_or_default()
     }

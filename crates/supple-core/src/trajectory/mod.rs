@@ -2,7 +2,7 @@
 //!
 //! Every trajectory starts from rest. If its path does not, time scaling is applied: the path speed
 //! rises smoothly from zero to its nominal value. If the velocity jumps by design (at the corners
-//! of the quadrant), the acceleration is that of the piece, without the jump.
+//! of the quadrant), the acceleration is that of the path segment, without the jump.
 
 mod arc;
 mod fourier;
@@ -23,7 +23,7 @@ pub use arc::Arc;
 pub use fourier::{Fourier, HARMONICS, JointReference, LimitViolation};
 pub use line::Line;
 pub use probe::{Probe, ProbePhase};
-pub use quadrant::{Piece, Quadrant};
+pub use quadrant::{PathSegment, Quadrant};
 pub use rotation::{OrientationReference, Rotation};
 pub use segment::{Segment, SegmentPeaks};
 pub use sinusoid::Sinusoid;
@@ -74,7 +74,7 @@ impl Trajectory {
         }
     }
 
-    /// Time after which the trajectory rests or repeats itself \[s\]; for a probe the time of its
+    /// Time after which the trajectory rests or repeats itself \[s\]; for a probe the duration of its
     /// first column.
     pub fn length_s(&self) -> f64 {
         match self {
@@ -91,8 +91,8 @@ impl Trajectory {
         }
     }
 
-    /// Periods within [`Trajectory::length_s`]: how often a check of equal time intervals has to see the path; for a
-    /// probe a quarter of its strokes, each of which is a straight line, and 1 where nothing repeats.
+    /// Number of periods within [`Trajectory::length_s`], which sets the number of samples of a check; for a
+    /// probe a quarter of its strokes, because each stroke is a straight line; 1 for a path that does not repeat.
     pub fn periods(&self) -> f64 {
         let of_length = |period_s: f64| self.length_s() / period_s;
         match self {

@@ -12,7 +12,7 @@ use super::reference::{
 };
 use crate::math::{Vector3, sin_cos, smooth_step};
 
-/// Peak speed of a minimum-jerk move is this times its mean speed.
+/// Ratio of peak speed to mean speed of a minimum-jerk move.
 const MINIMUM_JERK_PEAK: f64 = 1.875;
 
 /// Phase of the probing cycle.
@@ -56,7 +56,7 @@ pub struct Probe {
 }
 
 impl Probe {
-    /// Time of the way down, and of the way up \[s\].
+    /// Duration of the stroke down, and of the stroke up \[s\].
     pub fn stroke_s(&self) -> f64 {
         self.stroke_m / self.speed_m_per_s + self.ramp_s
     }
@@ -83,7 +83,7 @@ impl Probe {
         self.retreated_s() + self.step_s(self.radial_step_m)
     }
 
-    /// Time from the start of a stroke to the end of its way up \[s\].
+    /// Time from the start of a stroke until the tip is up again \[s\].
     fn retreated_s(&self) -> f64 {
         2.0 * self.stroke_s() + self.dwell_s
     }

@@ -1,9 +1,9 @@
 //! Quarter ellipse with unequal semi-axes and the two straight edges that close it, figure 3b.
 //!
 //! The path starts at the centre, runs out along the first semi-axis, along the quarter ellipse,
-//! and back along the second semi-axis; then it repeats. Speed is constant on each piece, so the
-//! velocity jumps at the three corners, where the acceleration stays that of the piece. With a corner
-//! ramp the speed rises from zero and falls to zero on each piece, so that no velocity jumps.
+//! and back along the second semi-axis; then it repeats. Speed is constant on each segment, so the
+//! velocity jumps at the three corners, where the acceleration stays that of the segment. With a corner
+//! ramp the speed rises from zero and falls to zero on each segment, so that no velocity jumps.
 
 use super::reference::{
     MINIMUM_JERK_SPEED, Reference, TrajectoryError, finite, positive, time_scaling,
@@ -21,9 +21,9 @@ const GAUSS: [(f64, f64); 5] = [
     (0.906_179_845_938_664, 0.236_926_885_056_189_1),
 ];
 
-/// Piece of the path.
+/// Segment of the path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Piece {
+pub enum PathSegment {
     /// From the centre out along the first semi-axis.
     Out,
     /// The quarter ellipse.
@@ -32,11 +32,11 @@ pub enum Piece {
     Back,
 }
 
-/// A place on the path, and how fast the path time advances there.
-struct OnPath {
-    piece: Piece,
-    round: u32,
-    /// Distance from the start of the piece \[m\].
+/// A position on the path, and the time scaling there.
+struct PathPosition {
+    segment: PathSegment,
+    lap: u32,
+    /// Distance from the start of the segment \[m\].
     along_m: f64,
     time_scale: f64,
     /// \[1/s\]
@@ -59,7 +59,7 @@ pub struct Quadrant {
 impl Quadrant {
     /// `centre_m` is the corner between the edges, `first_m` and `second_m` the semi-axes
     /// (orthogonal vectors in base axes, they span the plane), `speed_m_per_s` the speed on every
-    /// piece, `ramp_s` the ramp time of the time scaling from zero to one at the start.
+    /// segment, `ramp_s` the ramp time of the time scaling from zero to one at the start.
     pub fn new(
         centre_m: Vector3<f64>,
         first_m: Vector3<f64>,
@@ -83,8 +83,8 @@ impl Quadrant {
         quadrant
     }
 
-    /// The same path with a speed that rises from zero and falls to zero on every piece, each in
-    /// `corner_ramp_s`, with minimum jerk; zero: the velocity jumps at the corners. A piece must be
+    /// The same path with a speed that rises from zero and falls to zero on every segment, each in
+    /// `corner_ramp_s`, with minimum jerk; zero: the velocity jumps at the corners. A segment must be
     /// at least as long as its two ramps at that speed.
     pub fn with_corner_ramp(self, corner_ramp_s: f64) -> Quadrant {
         Quadrant {
@@ -119,7 +119,7 @@ impl Quadrant {
         self.second_m
     }
 
-    /// Speed on every piece \[m/s\].
+    /// Speed on every segment \[m/s\].
     pub fn speed_m_per_s(&self) -> f64 {
         self.speed_m_per_s
     }
@@ -134,7 +134,7 @@ impl Quadrant {
         self.corner_ramp_s
     }
 
-    /// Lengths of the pieces in order \[m\].
+    /// Lengths of the segments in order \[m\].
     pub fn lengths_m(&self) -> [f64; 3] {
         [
             norm(&self.first_m),
@@ -143,49 +143,53 @@ impl Quadrant {
         ]
     }
 
-    /// Time of one round at full speed, with the ramps at its corners \[s\].
+    /// Time of one lap at full speed, with the ramps at its corners \[s\].
     pub fn period_s(&self) -> f64 {
         self.lengths_m().iter().sum::<f64>() / self.speed_m_per_s + 3.0 * self.corner_ramp_s
     }
 
-    /// Piece, covered fraction of it (0 to 1), and completed rounds at `time_s`.
-    pub fn piece_at(&self, time_s: f64) -> (Piece, f64, u32) {
+    /// Segment, covered fraction of it (0 to 1), and completed laps at `time_s`.
+    pub fn segment_at(&self, time_s: f64) -> (PathSegment, f64, u32) {
         let (s, _, _) = time_scaling(time_s.max(0.0), self.ramp_s);
         let at = self.locate(s);
         let lengths = self.lengths_m();
-        (at.piece, at.along_m / lengths[at.piece as usize], at.round)
+        (
+            at.segment,
+            at.along_m / lengths[at.segment as usize],
+            at.lap,
+        )
     }
 
-    fn locate(&self, path_time_s: f64) -> OnPath {
+    fn locate(&self, path_time_s: f64) -> PathPosition {
         let lengths = self.lengths_m();
         let whole = lengths[0] + lengths[1] + lengths[2];
         // With ramps, a time on the path becomes the distance that the full speed covers in it.
         let ramp_m = self.corner_ramp_s * self.speed_m_per_s;
         let whole = whole + 3.0 * ramp_m;
         let distance = path_time_s * self.speed_m_per_s;
-        let round = libm::floor(distance / whole);
-        let along = distance - round * whole;
+        let lap = libm::floor(distance / whole);
+        let along = distance - lap * whole;
         let out = lengths[0] + ramp_m;
         let ellipse = out + lengths[1] + ramp_m;
-        let (piece, along) = if along < out {
-            (Piece::Out, along)
+        let (segment, along) = if along < out {
+            (PathSegment::Out, along)
         } else if along < ellipse {
-            (Piece::Ellipse, along - out)
+            (PathSegment::Ellipse, along - out)
         } else {
-            (Piece::Back, along - out - (lengths[1] + ramp_m))
+            (PathSegment::Back, along - out - (lengths[1] + ramp_m))
         };
         let (along_m, time_scale, time_scale_rate) =
-            self.corner_scaling(along, lengths[piece as usize]);
-        OnPath {
-            piece,
-            round: round as u32,
+            self.corner_scaling(along, lengths[segment as usize]);
+        PathPosition {
+            segment,
+            lap: lap as u32,
             along_m,
             time_scale,
             time_scale_rate,
         }
     }
 
-    /// Distance along a piece, time scale and its rate \[1/s\], `distance_m` after the corner at full speed.
+    /// Distance along a segment, time scale and its rate \[1/s\], `distance_m` after the corner at full speed.
     fn corner_scaling(&self, distance_m: f64, length_m: f64) -> (f64, f64, f64) {
         let ramp_s = self.corner_ramp_s;
         if ramp_s <= 0.0 {
@@ -206,8 +210,8 @@ impl Quadrant {
     pub(super) fn at(&self, time_s: f64) -> Reference {
         let (s, start_scale, start_rate) = time_scaling(time_s, self.ramp_s);
         let at = self.locate(s);
-        let (position, tangent, curvature) = match at.piece {
-            Piece::Out => {
+        let (position, tangent, curvature) = match at.segment {
+            PathSegment::Out => {
                 let tangent = self.first_m / norm(&self.first_m);
                 (
                     self.centre_m + tangent * at.along_m,
@@ -215,8 +219,8 @@ impl Quadrant {
                     Vector3::zeros(),
                 )
             }
-            Piece::Ellipse => self.on_ellipse(at.along_m),
-            Piece::Back => {
+            PathSegment::Ellipse => self.on_ellipse(at.along_m),
+            PathSegment::Back => {
                 let tangent = -self.second_m / norm(&self.second_m);
                 let position = self.centre_m + self.second_m + tangent * at.along_m;
                 (position, tangent, Vector3::zeros())
@@ -287,7 +291,7 @@ impl Quadrant {
         (speed, speed * (start + bend + corner))
     }
 
-    /// Time of the ramp and one round \[s\].
+    /// Time of the ramp and one lap \[s\].
     pub(super) fn length_s(&self) -> f64 {
         self.ramp_s + self.period_s()
     }
@@ -317,7 +321,7 @@ impl Quadrant {
         Err(TrajectoryError {
             entry: "corner_ramp_s",
             value: self.corner_ramp_s,
-            must: "zero, or at most the time of the shortest piece at full speed",
+            must: "zero, or at most the time of the shortest segment at full speed",
         })
     }
 }

@@ -1,4 +1,4 @@
-//! Reference of the tip's position, minimum-jerk scaling of time, and the error of a trajectory that cannot be.
+//! Reference of the tip's position, minimum-jerk time scaling, and the error type of invalid trajectories.
 
 use crate::math::{Vector3, all_finite, smooth_step};
 use core::fmt;
@@ -58,8 +58,8 @@ impl fmt::Display for TrajectoryError {
 
 impl core::error::Error for TrajectoryError {}
 
-/// Path time for a time scaling that is ramped from rest over `ramp_s`: value, first and second
-/// derivative. The path time lags by half the ramp time.
+/// Returns the path time and its first and second derivative, for a time scaling that is ramped from rest over
+/// `ramp_s`. After the ramp the path time lags by half the ramp time.
 pub(super) fn time_scaling(time_s: f64, ramp_s: f64) -> (f64, f64, f64) {
     if time_s >= ramp_s {
         return (time_s - 0.5 * ramp_s, 1.0, 0.0);

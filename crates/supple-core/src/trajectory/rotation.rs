@@ -1,13 +1,13 @@
-//! A turn of the tip about a fixed axis, from rest to rest.
+//! Rotation of the tip about a fixed axis, from rest to rest.
 
 use super::reference::{MINIMUM_JERK_SPEED, TrajectoryError, finite, positive};
 use crate::math::{Matrix3, Vector3, abs, sin_cos, skew, smooth_step, sqrt};
 use core::f64::consts::PI;
 
-/// Deviation of the axis from unit length that is allowed; the turn itself uses its direction alone.
+/// Maximum deviation of the axis from unit length; the rotation uses only the direction of the axis.
 const UNIT_TOLERANCE: f64 = 1e-6;
 
-/// A turn about a fixed axis along a minimum-jerk profile of its angle, then held.
+/// A rotation about a fixed axis with a minimum-jerk profile of its angle; afterwards the orientation is held.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rotation {
     /// Axis in base coordinates, a unit vector.
@@ -37,7 +37,7 @@ impl Rotation {
         duration_s: 1.0,
     };
 
-    /// Reference at `time_s` since the start, turned from `start`; before the start it is the start.
+    /// Returns the reference `time_s` after the start, rotated from `start`; before the start it is `start`.
     pub fn at(&self, start: &Matrix3<f64>, time_s: f64) -> OrientationReference {
         let axis = self.axis / sqrt(self.axis.dot(&self.axis));
         let (share, rate, second_derivative) = smooth_step(time_s / self.duration_s);
@@ -57,7 +57,7 @@ impl Rotation {
         MINIMUM_JERK_SPEED * abs(self.angle_rad) / self.duration_s
     }
 
-    /// Rejects an axis that is no unit vector, an angle beyond half a turn and a duration that is not positive.
+    /// Rejects an axis that is not a unit vector, an angle beyond half a turn and a duration that is not positive.
     ///
     /// # Errors
     /// The first invalid entry.

@@ -1,18 +1,18 @@
-//! A piece of a motion that set-points describe one after another: from the present reference to the newest set-point,
+//! Segment of a motion given by successive set-points: from the present reference to the newest set-point,
 //! then to rest.
 
 use super::reference::Reference;
 use crate::math::{Vector3, sqrt};
 
-/// Times at which the peaks of the way to the set-point are sampled; between two of them speed and acceleration of a
+/// Number of samples for the peaks on the way to the set-point; between two samples, speed and acceleration of a
 /// motion from rest to rest exceed the samples by less than 2 %.
 const SAMPLES: u32 = 16;
-/// The same while it comes to rest.
+/// Number of samples for the peaks while the reference comes to rest.
 const STOP_SAMPLES: u32 = 8;
 /// Shortest time in which the reference comes to rest \[s\].
 const MIN_STOP_S: f64 = 0.1;
-/// Stopping time over speed by the limit of acceleration: the mean deceleration is a third of the limit, which leaves
-/// room for the acceleration at its begin to fade.
+/// Stopping time divided by the ratio of speed to acceleration limit. The mean deceleration is thus a third of the limit, so
+/// that the initial acceleration can fade within the limit.
 const STOP_SHARE: f64 = 3.0;
 
 /// Quintic polynomial between two references that are given with velocity and acceleration. After its end the velocity
@@ -36,8 +36,8 @@ pub struct SegmentPeaks {
 }
 
 impl Segment {
-    /// From `from` at `from_s` to `to`, `duration_s` later; at the end it stops with about a third of
-    /// `max_acceleration_m_per_s2`. Both times \[s\] are on the clock of [`Segment::at`]; `duration_s` and the
+    /// Creates a segment from `from` at `from_s` to `to`, `duration_s` later; after it the reference stops with about a third of
+    /// `max_acceleration_m_per_s2`. `from_s` \[s\] is on the clock of [`Segment::at`]; `duration_s` and the
     /// acceleration are positive.
     pub fn new(
         from: Reference,
@@ -66,12 +66,12 @@ impl Segment {
         self.stopping((after_s / self.stop_s).min(1.0))
     }
 
-    /// Where it comes to rest \[m\], base axes.
+    /// Position at which the reference comes to rest \[m\], base axes.
     pub fn rest_m(&self) -> Vector3<f64> {
         self.stopping(1.0).position
     }
 
-    /// Time from its start until it rests \[s\].
+    /// Time from the start of the segment until the reference rests \[s\].
     pub fn length_s(&self) -> f64 {
         self.duration_s + self.stop_s
     }
@@ -82,7 +82,7 @@ impl Segment {
         let stop =
             (0..=STOP_SAMPLES).map(|k| self.stopping(f64::from(k) / f64::from(STOP_SAMPLES)));
         let (speed, acceleration) = way.chain(stop).fold((0.0, 0.0), |(v, a): (f64, f64), r| {
-            // Not `max`, which would drop what is not a number.
+            // Not `max`, which would drop a NaN.
             let greater = |old: f64, new: f64| if new <= old { old } else { new };
             (
                 greater(v, r.velocity.dot(&r.velocity)),
@@ -95,13 +95,13 @@ impl Segment {
         }
     }
 
-    /// Points along it, at which borders are checked \[m\].
+    /// Points along the segment at which borders are checked \[m\].
     pub fn points_m(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
         let way = (1..=SAMPLES).map(|k| self.quintic(f64::from(k) / f64::from(SAMPLES)).position);
         way.chain([self.rest_m()])
     }
 
-    /// The polynomial in Bernstein form, at a share of its duration.
+    /// Returns the polynomial, in Bernstein form, at a fraction of its duration.
     fn quintic(&self, share: f64) -> Reference {
         let (from, to, t) = (&self.from, &self.to, self.duration_s);
         let (a, b) = (t / 5.0, t * t / 20.0);
@@ -124,7 +124,8 @@ impl Segment {
         }
     }
 
-    /// After the end, at a share of the stopping time: velocity and acceleration fall to zero along a cubic.
+    /// Returns the reference after the end, at a fraction of the stopping time: velocity and acceleration decrease to zero along
+    /// a cubic.
     fn stopping(&self, share: f64) -> Reference {
         let (to, t) = (&self.to, self.stop_s);
         let x = share;

@@ -137,7 +137,7 @@ fn noise_of_quantised_positions() {
 }
 
 #[test]
-fn a_lost_reading_is_coasted_over_at_the_last_velocity() {
+fn a_lost_reading_is_extrapolated_at_the_last_velocity() {
     let (omega, period_s) = (200.0, 1e-3);
     let mut estimator = Estimator::at_rest(Vector::<2>::zeros());
     for k in 1..=400 {

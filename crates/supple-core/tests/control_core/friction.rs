@@ -80,7 +80,7 @@ fn equals_coulomb_and_viscous_friction_at_the_edge_of_the_band() {
 }
 
 /// The inner branch of (3.2) as printed gives `3 S` at the edge of the band, where the outer branch
-/// gives `S`: therefore the sign of the parabola is reversed here.
+/// gives `S`: therefore the sign of the parabola is reversed in this project.
 #[test]
 fn the_printed_parabola_jumps_by_twice_the_coulomb_torque() {
     let Friction {
@@ -261,8 +261,8 @@ const WITH_LOAD: Friction = Friction {
     ..WITH_DIP
 };
 
-/// In sliding dry friction is that without load and the coefficient times the motor's torque, which overcomes load and
-/// friction.
+/// The sliding dry friction is the dry friction without load plus the coefficient times the motor's torque, which overcomes load
+/// and friction.
 #[test]
 fn dry_friction_grows_with_the_torque_of_the_motor() {
     let unloaded_nm = WITH_LOAD.coulomb_nm - 0.1 * 4.0;
@@ -304,9 +304,10 @@ const WITH_TRAVEL: Friction = Friction {
     ..WITH_DIP
 };
 
-/// The direction depends on the travel alone, not on the steps in which it is taken, and tends to that of the motion.
+/// The direction depends only on the distance, not on the steps into which it is divided, and tends to the direction of the
+/// motion.
 #[test]
-fn direction_after_a_reversal_depends_on_the_travel_alone() {
+fn direction_after_a_reversal_depends_only_on_the_distance() {
     let law = WITH_TRAVEL;
     for from in [-1.0, -0.3, 0.0, 0.8] {
         for travel in [2e-4, 1e-3, -7e-4] {
@@ -318,7 +319,7 @@ fn direction_after_a_reversal_depends_on_the_travel_alone() {
         close(law.direction_after(from, 0.02), 1.0, 1e-7);
         close(law.direction_after(from, -0.02), -1.0, 1e-7);
     }
-    // In steady sliding the law is the same with and without it.
+    // In steady sliding the law is the same with and without presliding.
     let (sliding, v) = (law.direction_after(0.0, 0.1), 0.2);
     close(
         law.torque_in_direction_nm(v, sliding, 1.0),
@@ -327,9 +328,9 @@ fn direction_after_a_reversal_depends_on_the_travel_alone() {
     );
 }
 
-/// Over a closed motion presliding takes energy, however small the motion.
+/// Over any closed motion presliding removes energy.
 #[test]
-fn presliding_takes_energy() {
+fn presliding_removes_energy() {
     for size_rad in [1e-4, 5e-4, 2e-3, 2e-2] {
         let (mut direction, mut last, mut energy) = (0.0, 0.0_f64, 0.0);
         for k in 1..=20_000 {

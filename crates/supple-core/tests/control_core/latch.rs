@@ -2,7 +2,7 @@
 //! `control/contact.rs`.
 
 use supple_core::config::ContactLatch;
-use supple_core::latch::{Evidence, Latch};
+use supple_core::latch::{Latch, LatchInput};
 use supple_core::math::Vector3;
 
 use crate::support::configs::latch;
@@ -20,8 +20,8 @@ fn moving(config: &ContactLatch) -> Latch {
 }
 
 /// A force opposite to x on a tip at rest.
-fn against(newtons: f64, friction_uncertainty_n: f64) -> Evidence {
-    Evidence {
+fn against(newtons: f64, friction_uncertainty_n: f64) -> LatchInput {
+    LatchInput {
         force_n: -Vector3::x() * newtons,
         friction_uncertainty_n,
         tip_velocity_m_per_s: Vector3::zeros(),
@@ -34,7 +34,7 @@ fn cycle(latch: &mut Latch, config: &ContactLatch, velocity: Vector3<f64>, again
     latch.update_contact(config, &against(against_n, 0.0), PERIOD_S);
 }
 
-/// Whether `newtons` against a continued motion along x latch contact.
+/// Returns whether `newtons` against a continued motion along x latch contact.
 fn closes(config: &ContactLatch, newtons: f64, friction_uncertainty_n: f64) -> bool {
     let mut latch = moving(config);
     latch.update_direction(&(Vector3::x() * 0.04), PERIOD_S);
@@ -77,7 +77,7 @@ fn the_threshold_is_doubled_after_a_start_and_a_reversal() {
 /// A curved path is no reversal until its direction differs by more than a right angle from that at
 /// contact, however gradually.
 #[test]
-fn contact_is_remembered_by_its_direction() {
+fn the_latch_stores_the_direction_of_the_contact() {
     let config = latch();
     let mut latch = moving(&config);
     cycle(&mut latch, &config, Vector3::x() * 0.04, 10.0);
@@ -160,8 +160,8 @@ fn zero_elapsed_time_updates_contact_without_fading() {
 }
 
 /// Contact on a tip that moves with the reference.
-fn following(newtons: f64) -> Evidence {
-    Evidence {
+fn following(newtons: f64) -> LatchInput {
+    LatchInput {
         tip_velocity_m_per_s: Vector3::x() * 0.04,
         ..against(newtons, 0.0)
     }
@@ -175,10 +175,10 @@ fn releasing() -> ContactLatch {
 }
 
 /// Cycles until the latch is open, at most a second.
-fn open_after(latch: &mut Latch, config: &ContactLatch, evidence: &Evidence) -> u32 {
+fn open_after(latch: &mut Latch, config: &ContactLatch, input: &LatchInput) -> u32 {
     for cycle in 1..=1000 {
         latch.update_direction(&(Vector3::x() * 0.04), PERIOD_S);
-        latch.update_contact(config, evidence, PERIOD_S);
+        latch.update_contact(config, input, PERIOD_S);
         if !latch.in_contact() {
             return cycle;
         }
@@ -186,17 +186,17 @@ fn open_after(latch: &mut Latch, config: &ContactLatch, evidence: &Evidence) -> 
     u32::MAX
 }
 
-fn cycle_of(latch: &mut Latch, config: &ContactLatch, evidence: &Evidence) {
+fn cycle_of(latch: &mut Latch, config: &ContactLatch, input: &LatchInput) {
     latch.update_direction(&(Vector3::x() * 0.04), PERIOD_S);
-    latch.update_contact(config, evidence, PERIOD_S);
+    latch.update_contact(config, input, PERIOD_S);
 }
 
-fn close(latch: &mut Latch, config: &ContactLatch, evidence: &Evidence) {
-    cycle_of(latch, config, evidence);
+fn close(latch: &mut Latch, config: &ContactLatch, input: &LatchInput) {
+    cycle_of(latch, config, input);
     assert!(latch.in_contact());
 }
 
-/// Nothing is where the tip moves on with the reference: the latch opens before friction could have stopped it.
+/// If the tip continues to move with the reference, there is no obstacle: the latch opens before friction could stop the tip.
 #[test]
 fn a_latch_opens_while_the_tip_follows_the_reference() {
     let config = releasing();
@@ -204,7 +204,7 @@ fn a_latch_opens_while_the_tip_follows_the_reference() {
     close(&mut latch, &config, &following(10.0));
     let cycles = open_after(&mut latch, &config, &following(0.0));
     assert!((10..=11).contains(&cycles), "{cycles} ms");
-    // While the force is above the threshold, something is pushed along.
+    // While the force is above the threshold, the tip pushes an object along.
     close(&mut latch, &config, &following(10.0));
     assert_eq!(open_after(&mut latch, &config, &following(10.0)), u32::MAX);
 }
@@ -212,11 +212,11 @@ fn a_latch_opens_while_the_tip_follows_the_reference() {
 /// The motion of the tip does not confirm the contact, and the arm stands still without its feed-forward: the latch
 /// opens, and the next force above the threshold confirms it.
 #[test]
-fn an_unconfirmed_contact_must_push_twice() {
+fn an_unconfirmed_contact_needs_a_second_force_peak() {
     let config = releasing();
     let mut latch = moving(&config);
     close(&mut latch, &config, &following(10.0));
-    // Friction stops it a little later, without its feed-forward.
+    // Friction stops the tip a little later, without its feed-forward.
     (0..6).for_each(|_| cycle_of(&mut latch, &config, &following(0.0)));
     let cycles = open_after(&mut latch, &config, &against(0.5, 0.0));
     assert!((193..=195).contains(&cycles), "{cycles} ms");

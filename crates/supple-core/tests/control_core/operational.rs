@@ -11,7 +11,7 @@ use proptest::test_runner::TestCaseError;
 use supple_core::config::{FrictionVelocity, Gains, Role};
 use supple_core::dynamics::{Terms, crba, terms};
 use supple_core::impedance::{
-    Apparent, LawInput, MAX_TASK_INERTIA_KG_M2, MAX_TASK_MASS_KG, PositionTarget, Posture,
+    ChosenInertia, LawInput, MAX_TASK_INERTIA_KG_M2, MAX_TASK_MASS_KG, PositionTarget, Posture,
     SINGULAR_BELOW_M, Target, Task, Torques, impedance,
 };
 use supple_core::math::{Matrix3, Vector3};
@@ -92,7 +92,7 @@ fn pair(linear: &Vector3<f64>, angular: &Vector3<f64>) -> Vector<6> {
     Vector::<6>::from_iterator(linear.iter().chain(angular.iter()).copied())
 }
 
-/// Whether the inverse of the pose's mobility is undamped.
+/// Returns whether the inverse of the pose's mobility is undamped.
 fn regular(mobility: &Matrix<6, 6>) -> bool {
     let felt = inverse(mobility).diagonal();
     felt.fixed_rows::<3>(0).max() < MAX_TASK_MASS_KG
@@ -195,7 +195,7 @@ fn a_pose_takes_six_active_joints() {
 /// Motion that does not change the pose is damped; the damping never adds energy, also in singular
 /// poses.
 #[test]
-fn null_space_damping_of_the_pose_only_takes_energy() {
+fn null_space_damping_of_the_pose_only_removes_energy() {
     fn takes(case: &Case<7>) -> Outcome {
         let (arm, qd) = (case.arm(), &case.qd);
         let terms = filled(&arm, &case.q, qd);
@@ -235,7 +235,7 @@ fn agree<const N: usize, const D: usize>(
     Ok(())
 }
 
-/// The law with everything that it can add: friction, a posture, a chosen inertia.
+/// The law with all its optional terms: friction, a posture, a chosen inertia.
 fn compare<T: Target<D> + Copy, const N: usize, const D: usize>(
     case: &Case<N>,
     roles: &[Role; N],
@@ -253,7 +253,7 @@ fn compare<T: Target<D> + Copy, const N: usize, const D: usize>(
     .torque_nm(&case.q);
     let inertia = Matrix::<D, D>::from_fn(|i, j| if i == j { 3.0 + i as f64 } else { 0.2 });
     let force = Vector::from_fn(|i, _| 4.0 - 2.0 * i as f64);
-    let apparent = Apparent::new(&inertia, force);
+    let apparent = ChosenInertia::new(&inertia, force);
     assert!(apparent.is_some());
     let at = |velocity| Some((&friction, velocity));
     let laws = [
@@ -363,7 +363,7 @@ fn pose_beside_a_held_joint_is_the_law_in_terms() {
     check::<7>(|case| pose_sum_is_the_total(case, 6));
 }
 
-/// A posture pulls with bounded torque, and the tip feels nothing of it.
+/// The torque towards a posture is bounded and does not accelerate the tip.
 #[test]
 fn a_posture_does_no_work_at_the_tip() {
     check::<7>(|case| {
@@ -418,7 +418,7 @@ fn gains_that_could_add_energy_are_not_passive() {
 }
 
 #[test]
-fn equal_stiffness_pulls_with_the_sine_along_the_axis() {
+fn the_torque_of_equal_stiffness_is_the_sine_of_the_angle_along_the_axis() {
     let stiffness = Matrix3::from_diagonal_element(2.0);
     for (axis, angle) in [
         (Vector3::new(1.0, 0.0, 0.0), 0.3),
@@ -446,7 +446,7 @@ pub fn orientation_energy_j(
     })
 }
 
-/// What the torque does while the tip turns is what the energy loses, up to 179 degrees of error and for coupled
+/// The work of the torque while the tip rotates equals the decrease of the energy, up to 179 degrees of error and for coupled
 /// axes.
 #[test]
 fn the_torque_of_an_orientation_is_the_gradient_of_its_energy() {
@@ -473,7 +473,7 @@ fn the_torque_of_an_orientation_is_the_gradient_of_its_energy() {
     }
 }
 
-/// Stretched straight, with its axes in one plane, the arm still gets a finite torque.
+/// An arm that is stretched straight, with its axes in one plane, gets a finite torque.
 #[test]
 fn singular_poses_have_a_finite_torque() {
     let arm = support::arms::wam7();

@@ -23,7 +23,7 @@ fn residuals(sigma: f64, seconds: f64) -> impl Iterator<Item = f64> {
     })
 }
 
-/// One alarm per second is stated; a Gaussian residual of that bandwidth raises so many, whatever its size.
+/// The configured rate is one alarm per second; a Gaussian residual of that bandwidth causes this rate, independent of its size.
 #[test]
 fn false_alarms_come_at_the_stated_rate() {
     for sigma in [0.6, 0.9, 1.5] {
@@ -43,7 +43,7 @@ fn false_alarms_come_at_the_stated_rate() {
     }
 }
 
-/// At one per hour, none in ten minutes, and none from the start on.
+/// At a configured rate of one per hour there is no alarm in ten minutes, also not at the start.
 #[test]
 fn one_false_alarm_per_hour_is_none_in_ten_minutes() {
     let mut scale = ResidualScale::new(1.0, OMEGA);
@@ -53,7 +53,7 @@ fn one_false_alarm_per_hour_is_none_in_ten_minutes() {
     }
 }
 
-/// The factor stays within its range, and a force that is about to be detected hardly moves it.
+/// The factor stays within its range, and a force just below the threshold changes it only slightly.
 #[test]
 fn forces_of_contact_do_not_raise_the_scale() {
     let mut scale = ResidualScale::new(1.0, OMEGA);

@@ -12,7 +12,7 @@ use supple_core::math::{Matrix3, Vector3};
 use supple_core::trajectory::{Arc, Fourier, Line, Quadrant, Rotation, Sinusoid};
 use supple_core::{Config, Input, Output, Trajectory, Vector};
 
-/// Whether the input of this cycle reports idle drives.
+/// Returns whether the input of this cycle reports idle drives.
 pub fn drives_are_idle<const N: usize>(_: &Input<N>) -> bool {
     false
 }

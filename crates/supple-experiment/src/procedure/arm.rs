@@ -1,4 +1,4 @@
-//! What the procedure needs of an arm: it loads models, performs motions and logs them.
+//! Interface between the procedure and an arm: the arm loads models, performs motions and logs them.
 //!
 //! [`super::InProcessArm`] is the simulated arm in this process; the program `supple` has one for systems of processes.
 
@@ -20,46 +20,47 @@ pub trait MotionArm<const N: usize> {
     /// If the controller cannot be started with this model, or the drives do not become active.
     fn load(&mut self, model: &Description) -> Result<(), Self::Error>;
 
-    /// Present joint angles \[rad\].
+    /// Returns the present joint angles \[rad\].
     ///
     /// # Errors
     /// If the arm sends no state.
     fn position_rad(&mut self) -> Result<Vector<N>, Self::Error>;
 
-    /// Performs the steps in order and writes `<name>.mcap`, which is whole also if a fault stops the motion. The
-    /// arm then stays in its safe action.
+    /// Performs the steps in order and writes `<name>.mcap`, which is complete even if a fault stops the motion. After a fault
+    /// the arm stays in its safe action.
     ///
     /// # Errors
     /// A refused request; a process or a log that is lost.
-    fn perform(&mut self, name: &str, steps: &[Step<N>]) -> Result<Performed, Self::Error>;
+    fn perform(&mut self, name: &str, steps: &[Step<N>]) -> Result<PerformedMotion, Self::Error>;
 
-    /// Clears the fault of a stopped motion: the arm is held as by [`MotionArm::load`].
+    /// Clears the fault of a stopped motion; afterwards the arm is held as after [`MotionArm::load`].
     ///
     /// # Errors
     /// If the fault persists.
     fn recover(&mut self) -> Result<(), Self::Error>;
 
-    /// The arm with what its controller has learned since it was loaded; `None` if that is nothing.
+    /// Returns the description with the parameters that the controller has learned since the model was loaded; `None` if it has
+    /// learned none.
     ///
     /// # Errors
     /// If what was learned cannot be read.
     fn learned(&mut self) -> Result<Option<Description>, Self::Error>;
 
-    /// Does `work` while the arm keeps its mode.
+    /// Runs `work` while the arm stays in its mode.
     ///
     /// # Errors
     /// If the system is lost meanwhile.
     fn meanwhile<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> Result<T, Self::Error>;
 }
 
-/// What an arm did.
+/// Motion that an arm has performed.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Performed {
-    /// One for each recorded step, in order; the last one may be cut short by a fault.
+pub struct PerformedMotion {
+    /// Data of each recorded step, in order; a fault may have ended the last step early.
     pub motions: Vec<Motion>,
     /// Time in modes that move joints \[s\].
     pub moved_s: f64,
-    /// The fault that ended it.
+    /// The fault that ended the motion.
     pub stopped: Option<Stopped>,
 }
 
@@ -82,11 +83,11 @@ pub struct Stopped {
     pub step: usize,
     /// The fault in words.
     pub fault: String,
-    /// Its cause.
+    /// The cause of the fault.
     pub cause: StopCause,
 }
 
-/// What stops a motion.
+/// Cause of a stop of a motion.
 #[derive(Clone, Copy, Debug, Eq, PartialEq)]
 pub enum StopCause {
     /// A fault that contact causes: a collision, or a joint that is held back.
@@ -98,7 +99,7 @@ pub enum StopCause {
 }
 
 impl StopCause {
-    /// The cause of a fault of the controller.
+    /// Returns the cause for a fault of the controller.
     pub fn of_fault(by_contact: bool) -> StopCause {
         match by_contact {
             true => StopCause::Contact,
@@ -106,7 +107,7 @@ impl StopCause {
         }
     }
 
-    /// What to do where contact has no remedy of its own.
+    /// Returns the remedy, for callers that have no special remedy for contact.
     pub(crate) fn remedy(self) -> &'static str {
         match self {
             StopCause::Drives => DRIVES_REMEDY,
@@ -116,7 +117,7 @@ impl StopCause {
 }
 
 impl Motion {
-    /// Collects the data of a step.
+    /// Creates a collector for the data of a step.
     pub fn collector<const N: usize>() -> Collector<N> {
         Collector::default()
     }
@@ -148,7 +149,7 @@ impl<const N: usize> Collector<N> {
         self.in_contact = in_contact;
     }
 
-    /// The data of the step.
+    /// Returns the data of the step.
     pub fn finish(self) -> Motion {
         Motion {
             recording: Recording::of(&self.rows),

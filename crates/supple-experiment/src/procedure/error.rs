@@ -1,4 +1,4 @@
-//! Why a procedure ends early. Each message states what to do.
+//! Errors that end a procedure early. Each message states a remedy.
 
 use crate::error::ExperimentError;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ pub enum ProcedureError {
     #[error(transparent)]
     Experiment(#[from] ExperimentError),
     /// The motors, encoders and joints do not belong together as the description states.
-    #[error("{problem}: {remedy}; then go on with --resume")]
+    #[error("{problem}: {remedy}; then continue with --resume")]
     Wiring {
         /// Finding, with the joint.
         problem: String,
@@ -26,8 +26,8 @@ pub enum ProcedureError {
         /// Drawing of the space.
         drawing: PathBuf,
     },
-    /// A fault stopped a motion, and going on is not safe or did not help.
-    #[error("{motion}: stopped by a fault: {fault}; {remedy}, then go on with --resume")]
+    /// A fault stopped a motion, and repeating the motion is not safe or did not help.
+    #[error("{motion}: stopped by a fault: {fault}; {remedy}, then continue with --resume")]
     Stopped {
         /// Name of the motion.
         motion: String,

@@ -87,7 +87,7 @@ fn log_of<const N: usize>(rows: &mut Vec<(f64, Vector<N>, Vector<N>)>) -> Option
     })
 }
 
-/// `model` with its dry friction scaled to the measured breakaway torques.
+/// Returns `model` with its dry friction scaled to the measured breakaway torques.
 ///
 /// # Errors
 /// If the description cannot be edited.
@@ -120,8 +120,7 @@ pub fn scale_dry_friction<const N: usize>(
     }
 }
 
-/// Reads the motions of a log without contact, of at least 2 s in a mode with a reference, in which every joint moves; empty if
-/// there is none.
+/// Reads the motions of a log that have no contact and a reference for at least 2 s, and in which every joint moves.
 ///
 /// # Errors
 /// A log that cannot be read.
@@ -138,15 +137,15 @@ pub fn read_position_controlled_motions<const N: usize>(
     }
 }
 
-/// Whether every joint moves by [`MIN_RANGE_RAD`] or more: only such motions can be fitted.
+/// Returns whether every joint moves by [`MIN_RANGE_RAD`] or more: only such motions can be fitted.
 fn every_joint_moves(log: &Log) -> bool {
     let mut columns = log.q_rad.column_iter();
     columns.all(|q| q.max() - q.min() > MIN_RANGE_RAD)
 }
 
 /// Fits a model to `others` and to the excitation without its end, which validates the fit. `None` if the fit predicts the
-/// torques of that end no better than `model`, or if no controller starts with it: after so little motion rotors may be found
-/// to have no inertia, and any damping then shakes the joint.
+/// torques of that end no better than `model`, or if no controller starts with the fit: after so little motion the identified
+/// rotor inertias may be zero, and any damping would then make the joint unstable.
 ///
 /// # Errors
 /// A log that cannot be used.
@@ -158,7 +157,10 @@ pub fn fit_first<const N: usize>(
     let config = model.config::<N>()?;
     let rows = excitation.t_s.len();
     let cut = ((1.0 - HELD_OUT_FRACTION) * rows as f64) as usize;
-    let (fitted, held_out) = (part(excitation, 0, cut), part(excitation, cut, rows - cut));
+    let (fitted, held_out) = (
+        log_rows(excitation, 0, cut),
+        log_rows(excitation, cut, rows - cut),
+    );
     let mut logs = vec![fitted];
     logs.extend_from_slice(others);
     let (fit, _) = identify_best(model, &config, &logs, &[])?;
@@ -172,8 +174,8 @@ pub fn fit_first<const N: usize>(
 }
 
 /// Fits a model to `logs` (excitations and slow motions) and the torque ripple to `constant_speed`, and validates both on the
-/// motion `validation`. The joints that `start` holds are held in the tracking that is judged. The collision thresholds come from
-/// the residuals of `logs`, `validation` and `others`, such as moves.
+/// motion `validation`. The joints that `start` holds are also held for the interval of the tracking error. The collision
+/// thresholds are derived from the residuals of `logs`, `validation` and `others`, such as moves.
 ///
 /// # Errors
 /// A log that cannot be used.
@@ -206,16 +208,16 @@ pub fn fit_all<const N: usize>(
     let present_nm = config.collision.move_joint_torque_nm;
     let mut thresholds = fit.move_collision_nm(&validations, &config);
     for (joint, threshold_nm) in thresholds.iter_mut().enumerate() {
-        // The residuals are filtered more than the torques of the collision observer, and do not show its peaks.
+        // The filter of the residuals has a lower cutoff than the collision observer and removes its peaks.
         let min_nm = MIN_THRESHOLD_FRACTION * present_nm[joint];
         *threshold_nm = threshold_nm.map(|nm| nm.max(min_nm));
     }
     Ok((described.with_move_collision(&thresholds)?, quality))
 }
 
-/// `model` with thresholds that its dry friction does not exceed: the collision thresholds of its joints are at least `least_nm`,
-/// up to half of their torque limits, and `plausible.against_share`, the limit for torque against a joint's acceleration, is
-/// above the dry friction: when a joint begins to move, the torque may still have the other sign by that much.
+/// Returns `model` with thresholds that its dry friction does not exceed: the collision thresholds of its joints are at least
+/// `least_nm`, up to half of their torque limits, and `plausible.against_share`, the limit for torque against a joint's
+/// acceleration, is above the dry friction: when a joint begins to move, the torque may still have the other sign by that much.
 fn raise_thresholds<const N: usize>(
     model: &Description,
     least_nm: &[Option<f64>; N],
@@ -239,7 +241,7 @@ fn raise_thresholds<const N: usize>(
     Ok(model.with_minimum_thresholds(&minimum)?)
 }
 
-/// [`identify_with`] with those of [`fit_options`] that leave the smallest part of the torques unexplained.
+/// Runs [`identify_with`] for all [`fit_options`], and returns the fit that leaves the smallest part of the torques unexplained.
 fn identify_best<const N: usize>(
     model: &Description,
     config: &Config<N>,
@@ -258,9 +260,9 @@ fn identify_best<const N: usize>(
     Ok(best)
 }
 
-/// Friction terms and priors of the fits to try. Arms with `[bus]` have geared motors, whose friction grows with their load. Gravity
-/// leaves them little torque, so that they move slowly and their torques contain little information about the inertia: without a
-/// prior, errors of the friction model would be fitted as inertias of rotors and links.
+/// Returns friction terms and priors of the fits to try. Arms with `[bus]` have geared motors, whose friction grows with their
+/// load. These motors need most of their torque against gravity, so that they move slowly and their torques contain little
+/// information about the inertia: without a prior, errors of the friction model would be fitted as inertias of rotors and links.
 fn fit_options(model: &Description) -> (FitOptions, Vec<FitOptions>) {
     let geared = |load: LoadTorque| FitOptions {
         friction: FrictionColumns {
@@ -279,7 +281,8 @@ fn fit_options(model: &Description) -> (FitOptions, Vec<FitOptions>) {
     }
 }
 
-/// Minimum speed of the samples that are fitted \[rad/s\]: [`SLOW_RAD_PER_S`], or less if a joint never reaches that speed.
+/// Returns the minimum speed of the samples that are fitted \[rad/s\]: [`SLOW_RAD_PER_S`], or less if a joint never reaches that
+/// speed.
 fn min_fitted_rad_per_s(logs: &[Log]) -> f64 {
     let joints = logs.first().map_or(0, |log| log.q_rad.ncols());
     let slowest = (0..joints).map(|joint| {
@@ -289,7 +292,7 @@ fn min_fitted_rad_per_s(logs: &[Log]) -> f64 {
     SLOW_RAD_PER_S.min(MIN_SPEED_FRACTION * slowest.fold(f64::INFINITY, f64::min))
 }
 
-/// Peak speed of a joint in a log, averaged over [`SPEED_AVERAGING_S`].
+/// Returns the peak speed of a joint in a log, averaged over [`SPEED_AVERAGING_S`].
 fn peak_rad_per_s(log: &Log, joint: usize) -> f64 {
     let mut first = 0;
     let mut peak: f64 = 0.0;
@@ -304,7 +307,7 @@ fn peak_rad_per_s(log: &Log, joint: usize) -> f64 {
     peak
 }
 
-fn part(log: &Log, first: usize, rows: usize) -> Log {
+fn log_rows(log: &Log, first: usize, rows: usize) -> Log {
     Log {
         t_s: log.t_s[first..first + rows].to_vec(),
         q_rad: log.q_rad.rows(first, rows).into_owned(),
@@ -337,8 +340,8 @@ fn quality<const N: usize>(
     })
 }
 
-/// Interval of the tracking error at 5 N/m of a controller with the model `described`, which holds the joints that `start` holds;
-/// `None` also for a model that no controller takes.
+/// Returns the interval of the tracking error at 5 N/m of a controller with the model `described`, which holds the joints that
+/// `start` holds; `None` also for a model that no controller accepts.
 fn interval<const N: usize>(
     fit: &Fit<N>,
     described: &Description,
@@ -346,7 +349,7 @@ fn interval<const N: usize>(
     motion: &Motion,
 ) -> Option<ErrorInterval> {
     let described = described.with_held_joints_of(start).ok()?;
-    let moving = fit.columns.moving();
+    let moving = fit.columns.identified_joints();
     error_interval_of::<N>(&described, moving, &[motion], STIFFNESS_N_PER_M)
         .ok()
         .flatten()

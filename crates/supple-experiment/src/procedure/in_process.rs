@@ -1,6 +1,6 @@
-//! The simulated arm in this process, in virtual time: time passes only while it moves.
+//! The simulated arm in this process, in virtual time: time advances only in simulated cycles.
 
-use super::arm::{Motion, MotionArm, Performed, StopCause, Stopped};
+use super::arm::{Motion, MotionArm, PerformedMotion, StopCause, Stopped};
 use super::error::ProcedureError;
 use crate::error::ExperimentError;
 use crate::record::Recorder;
@@ -15,11 +15,11 @@ use supple_core::{Controller, Vector};
 use supple_model::Description;
 use supple_plant::PlantConfig;
 
-/// Time with idle drives while another model is loaded \[s\].
+/// Time for which the drives are idle while another model is loaded \[s\].
 const IDLE_S: f64 = 0.3;
 /// Gravity hold before the first motion \[s\].
 const SETTLE_S: f64 = 0.2;
-/// Time for which a stopped arm comes to rest \[s\].
+/// Time in which a stopped arm comes to rest \[s\].
 const REST_S: f64 = 1.0;
 
 /// A simulated arm with its controller.
@@ -28,14 +28,14 @@ pub struct InProcessArm<const N: usize> {
     model: Option<Description>,
     plant: PlantConfig<N>,
     start_rad: Vector<N>,
-    /// How its encoders and motors are connected, if wrongly.
+    /// Connections of encoders and motors, which may differ from the description.
     wiring: Wiring<N>,
     folder: PathBuf,
     notes: BTreeMap<String, String>,
 }
 
 impl<const N: usize> InProcessArm<N> {
-    /// An arm at rest at `start_rad`; logs go to the existing `folder`, with `notes`.
+    /// Creates an arm at rest at `start_rad`; writes logs to the existing `folder`, with `notes`.
     pub fn new(
         plant: PlantConfig<N>,
         start_rad: Vector<N>,
@@ -47,13 +47,13 @@ impl<const N: usize> InProcessArm<N> {
             model: None,
             plant,
             start_rad,
-            wiring: Wiring::RIGHT,
+            wiring: Wiring::AS_DESCRIBED,
             folder,
             notes,
         }
     }
 
-    /// The same arm with encoders or motors connected wrongly.
+    /// Returns the same arm with these connections of encoders and motors.
     #[must_use]
     pub fn with_wiring(self, wiring: Wiring<N>) -> Self {
         InProcessArm { wiring, ..self }
@@ -66,7 +66,7 @@ impl<const N: usize> InProcessArm<N> {
         })
     }
 
-    /// Runs a mode for a time; returns the fault that is latched at its end, in words.
+    /// Runs a mode for a time; returns the fault that is latched at the end, in words.
     fn hold(
         &mut self,
         request: Request<N>,
@@ -82,7 +82,7 @@ impl<const N: usize> InProcessArm<N> {
         Ok(fault.map(|fault| in_words(config, &fault)))
     }
 
-    /// Holds still: in gravity hold, or by position loops where no brakes would stop the arm.
+    /// Holds the arm at rest: in gravity hold, or by position loops if it has no brakes.
     fn settle(&mut self, motion: &str, remedy: &'static str) -> Result<(), ProcedureError> {
         let without_brakes = self
             .model
@@ -112,7 +112,11 @@ impl<const N: usize> InProcessArm<N> {
         }
     }
 
-    fn performed(&mut self, name: &str, steps: &[Step<N>]) -> Result<Performed, ProcedureError> {
+    fn performed(
+        &mut self,
+        name: &str,
+        steps: &[Step<N>],
+    ) -> Result<PerformedMotion, ProcedureError> {
         let model = self.model.clone();
         let (folder, notes) = (self.folder.clone(), self.notes.clone());
         let seed = self.plant.seed;
@@ -122,7 +126,7 @@ impl<const N: usize> InProcessArm<N> {
             Some(model) => Some(Recorder::named(&folder, model, name, &config, seed, notes)?),
             None => None,
         };
-        let mut performed = Performed::default();
+        let mut performed = PerformedMotion::default();
         'steps: for (number, step) in steps.iter().enumerate() {
             let mut collector = Motion::collector::<N>();
             let mut wanted: Option<Mode> = None;
@@ -130,7 +134,7 @@ impl<const N: usize> InProcessArm<N> {
                 let cycle = rig.cycle((k == 0).then_some(step.request));
                 let output = &cycle.output;
                 if let Some(recorder) = &mut recorder {
-                    recorder.cycle(&cycle)?;
+                    recorder.write_cycle(&cycle)?;
                 }
                 if let Some(refusal) = output.refusal {
                     return Err(ProcedureError::from(ExperimentError::Refused {
@@ -178,7 +182,7 @@ impl<const N: usize> InProcessArm<N> {
     }
 }
 
-/// Whether a mode counts as motion of the arm.
+/// Returns whether the arm moves in this mode.
 pub fn moves_joints(mode: Mode) -> bool {
     matches!(
         mode,
@@ -222,7 +226,11 @@ impl<const N: usize> MotionArm<N> for InProcessArm<N> {
         Ok(wiring.read(&rig.plant().measurement().position_rad))
     }
 
-    fn perform(&mut self, name: &str, steps: &[Step<N>]) -> Result<Performed, ProcedureError> {
+    fn perform(
+        &mut self,
+        name: &str,
+        steps: &[Step<N>],
+    ) -> Result<PerformedMotion, ProcedureError> {
         self.performed(name, steps)
     }
 

@@ -1,13 +1,13 @@
-//! From an arm to its model: the steps of a calibration, the same for the simulated arm in this process and for systems
-//! of processes ([`MotionArm`]).
+//! Calibration of an arm. The steps are the same for the simulated arm in this process and for systems of processes
+//! ([`MotionArm`]).
 //!
 //! ```text
 //! wiring -> swept space confirmed -> warm-up -> breakaway -> first pass -> first fit (loaded)
 //!        -> full pass -> slow -> constant speed -> validation motion -> identification (loaded) -> float -> sinusoid
 //! ```
 //!
-//! A finished step is never repeated: [`Progress`] is written after each. The model of the first fit is loaded before the
-//! arm moves at full amplitude. Contact stops a motion; it is repeated after the arm has moved back to its start.
+//! A finished step is never repeated: [`Progress`] is written after each step. The model of the first fit is loaded before the
+//! arm moves at full amplitude. If contact stops a motion, the arm moves back to the start of the motion and repeats it.
 
 mod arm;
 mod error;
@@ -26,7 +26,7 @@ pub use options::{
     DRAWING, FIRST_MODEL, LEARNED_MODEL, LEARNING_S, LOGS, Operator, ProcedureOptions,
 };
 
-pub use arm::{Collector, Motion, MotionArm, Performed, StopCause, Stopped};
+pub use arm::{Collector, Motion, MotionArm, PerformedMotion, StopCause, Stopped};
 pub use error::ProcedureError;
 pub use fitting::read_excitations;
 pub use in_process::{InProcessArm, moves_joints};

@@ -1,4 +1,4 @@
-//! The motions of a calibration, their requests and how long they take.
+//! The motions of a calibration, their requests and durations.
 
 use crate::error::ExperimentError;
 use crate::excite::move_to;
@@ -9,11 +9,11 @@ use supple_core::dynamics::{crba, gravity, rnea};
 use supple_core::trajectory::{Fourier, HARMONICS, JointReference};
 use supple_core::{Config, Controller, Vector};
 use supple_ident::IdentError;
-use supple_ident::design::{DesignOptions, constant_speed_series, design, slow_series};
+use supple_ident::excitation_design::{DesignOptions, constant_speed_series, design, slow_series};
 
 /// Period of the excitations \[s\], and the number of periods of each and of the validation motion.
 const EXCITATION: (f64, f64, f64) = (12.0, 1.0, 1.25);
-/// Number of excitations: other poses give more information than repetitions.
+/// Number of excitations: excitations about different poses give more information than repetitions.
 const EXCITATIONS: u64 = 3;
 /// Fraction of the amplitude of the first pass, and its number of periods.
 const FIRST: (f64, f64) = (0.25, 1.5);
@@ -21,13 +21,13 @@ const FIRST: (f64, f64) = (0.25, 1.5);
 const FIRST_OF_CAREFUL: f64 = 0.5;
 /// Share of the torque limits that careful designs and their ripple runs use.
 const CAREFUL_SHARE: f64 = 1.0 / 1.5;
-/// Share of the torque limits that a motion about a pose may need.
+/// Maximum share of the torque limits that a motion about a pose may need.
 const TORQUE_SHARE: f64 = 0.8;
 /// Number of times that the amplitude of such a motion is reduced, and the factor.
 const REDUCTIONS: (usize, f64) = (20, 0.85);
-/// Poses of a straight line at which they are.
+/// Number of poses of a straight line at which torques are evaluated.
 const LINE_POSES: usize = 40;
-/// Poses of a series at which torques are evaluated.
+/// Number of poses of a series at which torques are evaluated.
 const POSES: usize = 400;
 /// Maximum joint speed \[rad/s\] and period \[s\] of slow motion.
 const SLOW: (f64, f64) = (0.1, 40.0);
@@ -36,11 +36,11 @@ const CONSTANT: ([f64; 2], f64) = ([0.06, 0.12], 25.0);
 /// Seed of the validation motion, relative to that of the excitation.
 const UNSEEN_SEED: u64 = 1000;
 
-/// Slope of the torque ramps that show which joint a motor moves \[N m/s\], and motion at which they stop \[rad\].
+/// Slope of the torque ramps that determine which joint a motor moves \[N m/s\], and joint motion at which a ramp stops \[rad\].
 pub const WIRING_RAMP: (f64, f64) = (15.0, 0.03);
 /// Maximum of that slope over the inertia of the joint \[rad/s^3\]: the joint has about 1 rad/s when its ramp stops.
 const WIRING_RAMP_PER_INERTIA: f64 = 200.0;
-/// Slope of the ramps that measure the breakaway torque \[N m/s\], and motion at which they stop \[rad\].
+/// Slope of the ramps that measure the breakaway torque \[N m/s\], and joint motion at which a ramp stops \[rad\].
 pub const BREAKAWAY_RAMP: (f64, f64) = (0.4, 0.025);
 /// Maximum torque of a ramp \[N m\].
 pub const RAMP_LIMIT_NM: f64 = 6.0;
@@ -71,7 +71,7 @@ pub struct Motions<const N: usize> {
 pub struct DesignPlan {
     /// Seed of the designs.
     pub seed: u64,
-    /// Number of candidates of each.
+    /// Number of candidates of each design.
     pub candidates: usize,
     /// Whether gravity may need much of the torque limits, so that slow motion is about the light pose instead of home.
     pub about_light_pose: bool,
@@ -83,7 +83,7 @@ impl<const N: usize> Motions<N> {
     /// Designs the motions of all joints within the limits of `config`.
     ///
     /// # Errors
-    /// Limits that no motion meets.
+    /// Limits that no motion satisfies.
     pub fn design(
         config: &Config<N>,
         home_rad: &Vector<N>,
@@ -103,7 +103,7 @@ impl<const N: usize> Motions<N> {
                 candidates,
                 period_s,
                 periods,
-                ..DesignOptions::of(&joints)
+                ..DesignOptions::new(&joints)
             };
             design(config, home_rad, &options, &mut |_, _| {}).map(|found| found.series)
         };
@@ -144,7 +144,7 @@ impl<const N: usize> Motions<N> {
         })
     }
 
-    /// All series, in the order in which they are performed.
+    /// Returns all series, in the order in which they are performed.
     pub fn all(&self) -> Vec<Fourier<N>> {
         let mut all = vec![self.first];
         all.extend(&self.full);
@@ -155,7 +155,7 @@ impl<const N: usize> Motions<N> {
     }
 }
 
-/// The greatest gains of the move mode that the loop of `model` allows in all poses of these series.
+/// Returns the greatest gains of the move mode at which the position loops of `model` are stable in all poses of these series.
 ///
 /// # Errors
 /// A configuration that no controller accepts.
@@ -178,13 +178,13 @@ fn states<const N: usize>(series: &Fourier<N>) -> impl Iterator<Item = JointRefe
     (0..=POSES).map(move |i| series.at(series.duration_s * i as f64 / POSES as f64))
 }
 
-/// Greatest share of a torque limit.
+/// Returns the greatest ratio of a torque to its limit.
 fn share<const N: usize>(config: &Config<N>, torque_nm: &Vector<N>) -> f64 {
     let shares = torque_nm.component_div(&config.limits.joint_torque_nm);
     shares.amax()
 }
 
-/// The pose of these series in which gravity needs the smallest share of the torque limits.
+/// Returns the pose of these series in which gravity needs the smallest share of the torque limits.
 fn light_pose<const N: usize>(config: &Config<N>, all: &[Fourier<N>]) -> Vector<N> {
     let poses = all.iter().flat_map(states).map(|state| state.position_rad);
     let weighed = poses.map(|q| (share(config, &gravity(&config.arm, &q)), q));
@@ -192,7 +192,7 @@ fn light_pose<const N: usize>(config: &Config<N>, all: &[Fourier<N>]) -> Vector<
     light.map_or_else(Vector::zeros, |(_, q)| q)
 }
 
-/// The series with amplitudes for which the model needs no more than [`TORQUE_SHARE`] of the torque limits.
+/// Returns the series with amplitudes for which the model needs no more than [`TORQUE_SHARE`] of the torque limits.
 fn within_torque<const N: usize>(config: &Config<N>, mut series: Fourier<N>) -> Fourier<N> {
     let (times, by) = REDUCTIONS;
     for _ in 0..times {
@@ -211,7 +211,7 @@ fn within_torque<const N: usize>(config: &Config<N>, mut series: Fourier<N>) -> 
     series
 }
 
-/// The series with smaller amplitudes and another number of periods.
+/// Returns the series with its amplitudes multiplied by `by`, and with `periods` periods.
 fn scaled<const N: usize>(series: &Fourier<N>, by: f64, periods: f64) -> Fourier<N> {
     let mut scaled = *series;
     for k in 0..HARMONICS {
@@ -222,17 +222,17 @@ fn scaled<const N: usize>(series: &Fourier<N>, by: f64, periods: f64) -> Fourier
     scaled
 }
 
-/// A pose through which moves go whose straight line would need more than [`TORQUE_SHARE`] of the torque limits.
+/// Via pose of moves whose straight line would need more than [`TORQUE_SHARE`] of the torque limits.
 #[derive(Clone, Copy, Debug)]
-pub struct Detour<const N: usize> {
+pub struct ViaPose<const N: usize> {
     /// The model.
     pub config: Config<N>,
-    /// The pose: gravity needs little torque there.
+    /// The via pose, in which gravity needs little torque.
     pub light_rad: Vector<N>,
 }
 
-impl<const N: usize> Detour<N> {
-    /// Greatest share of a torque limit that gravity and dry friction need along a line.
+impl<const N: usize> ViaPose<N> {
+    /// Returns the greatest share of a torque limit that gravity and dry friction need along a line.
     fn share_along(&self, from_rad: &Vector<N>, to_rad: &Vector<N>) -> f64 {
         let config = &self.config;
         let dry_nm = Vector::from_fn(|j, _| config.friction[j].breakaway_nm);
@@ -258,19 +258,19 @@ impl<const N: usize> Detour<N> {
     }
 }
 
-/// Moves to the start of each series and follows it.
+/// Returns the steps that move to the start of each series and follow it.
 pub fn follow<const N: usize>(
     config: &Config<N>,
     from_rad: &Vector<N>,
     all: &[Fourier<N>],
-    detour: Option<&Detour<N>>,
+    via_pose: Option<&ViaPose<N>>,
 ) -> Vec<Step<N>> {
     let mut steps = Vec::new();
     let mut at_rad = *from_rad;
     for series in all {
         let start_rad = series.at(0.0).position_rad;
-        match detour {
-            Some(detour) => steps.extend(detour.moves(&at_rad, &start_rad)),
+        match via_pose {
+            Some(via_pose) => steps.extend(via_pose.moves(&at_rad, &start_rad)),
             None => steps.push(move_to(config, &start_rad, &at_rad)),
         }
         steps.push(Step {
@@ -282,8 +282,8 @@ pub fn follow<const N: usize>(
     steps
 }
 
-/// Moves to `pose_rad`, ramps the torque of a joint there, in the direction of the sign of `rate_nm_per_s`, and moves
-/// back.
+/// Returns the steps that move to `pose_rad`, ramp the torque of a joint in that pose, in the direction of the sign of
+/// `rate_nm_per_s`, and move back.
 pub fn ramp<const N: usize>(
     config: &Config<N>,
     from_rad: &Vector<N>,
@@ -305,7 +305,7 @@ pub fn ramp<const N: usize>(
             recorded: true,
             ..Step::wait(Request::Breakaway(ramp), duration_s)
         },
-        // Gravity that the model lacks would pull the arm away from there.
+        // Gravity that the model lacks would pull the arm away from that pose.
         move_to(config, pose_rad, pose_rad),
     ];
     let is_there = (pose_rad - from_rad).amax() < THERE_RAD;
@@ -313,7 +313,8 @@ pub fn ramp<const N: usize>(
     approach.into_iter().chain(ramp).collect()
 }
 
-/// Slope of the ramp that shows whether a motor moves this joint \[N m/s\]: less for a light joint.
+/// Returns the slope of the ramp that determines whether a motor moves this joint \[N m/s\]: smaller for a joint of small
+/// inertia.
 pub fn wiring_slope_nm_per_s<const N: usize>(
     config: &Config<N>,
     pose_rad: &Vector<N>,
@@ -323,7 +324,7 @@ pub fn wiring_slope_nm_per_s<const N: usize>(
     WIRING_RAMP.0.min(WIRING_RAMP_PER_INERTIA * inertia_kg_m2)
 }
 
-/// Time that ramps in both directions take, for a model with these breakaway torques \[s\].
+/// Returns the duration of ramps in both directions, for a model with these breakaway torques \[s\].
 pub fn ramps_s<const N: usize>(config: &Config<N>) -> f64 {
     let breakaway_nm: f64 = config.friction.iter().map(|f| f.breakaway_nm).sum();
     let there = Vector::zeros();

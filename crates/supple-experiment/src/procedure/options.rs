@@ -4,7 +4,7 @@ use super::progress::StepName;
 use super::sweep::Sweep;
 use std::path::PathBuf;
 
-/// Time of learning before the second error of the sinusoid counts \[s\].
+/// Time of learning before the second error of the sinusoid is measured \[s\].
 pub const LEARNING_S: f64 = 24.0;
 
 /// Remedy for a fault in the first gravity hold.
@@ -15,13 +15,13 @@ pub(crate) const HOLD_REMEDY: &str = "check signs and units of the torques, the 
 pub(crate) const DRIVES_REMEDY: &str = "see what their process has written before this: an operator or the safety module made them idle, \
      or torques came too late (use real-time priority and a machine that does nothing else)";
 
-/// Folder of the logs, within that of the results.
+/// Folder of the logs, within the folder of the results.
 pub const LOGS: &str = "logs";
 
-/// Folder of the model of the first pass, within that of the results.
+/// Folder of the model of the first pass, within the folder of the results.
 pub const FIRST_MODEL: &str = "first";
 
-/// Folder of the identified model with what was learned in the sinusoid, within that of the results.
+/// Folder of the identified model with the parameters learned in the sinusoid, within the folder of the results.
 pub const LEARNED_MODEL: &str = "learned";
 
 /// Drawing of the swept space.
@@ -38,14 +38,14 @@ pub struct ProcedureOptions {
     pub candidates: usize,
     /// Duration of the warm-up \[s\].
     pub warm_up_s: f64,
-    /// Whether to go on after the last finished step.
+    /// Whether to continue after the last finished step.
     pub resume: bool,
     /// The last step to perform; `None` for all.
     pub until: Option<StepName>,
 }
 
 impl ProcedureOptions {
-    /// Seed 0, 600 candidates, a warm-up of 7 s.
+    /// Creates options with seed 0, 600 candidates, and a warm-up of 7 s.
     pub fn new(out: PathBuf) -> ProcedureOptions {
         ProcedureOptions {
             out,
@@ -60,9 +60,9 @@ impl ProcedureOptions {
 
 /// The person at the arm.
 pub trait Operator {
-    /// Receives a line about what is done.
+    /// Receives one line of text about the present step.
     fn progress(&mut self, text: &str);
 
-    /// Whether the arm may sweep this space, drawn in the file of this name.
+    /// Asks whether the arm may sweep this space, which the file `drawing` depicts.
     fn confirms(&mut self, sweep: &Sweep, drawing: &std::path::Path) -> bool;
 }

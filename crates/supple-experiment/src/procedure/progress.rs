@@ -1,4 +1,4 @@
-//! What is finished of a procedure, in a file, so that it can be resumed.
+//! File with the finished steps of a procedure, from which the procedure can be resumed.
 
 use super::error::ProcedureError;
 use super::sweep::Sweep;
@@ -20,9 +20,9 @@ const MAX_BYTES: u64 = 1 << 20;
 pub enum StepName {
     /// Signs, order and torque units, by small motions.
     Wiring,
-    /// The swept space was confirmed.
+    /// Confirmation of the swept space.
     Confirmed,
-    /// Motion that warms the joints.
+    /// Motion that warms up the joints.
     WarmUp,
     /// Breakaway torque of each joint.
     Breakaway,
@@ -81,29 +81,29 @@ impl FromStr for StepName {
 pub struct FinishedStep {
     /// The step.
     pub step: StepName,
-    /// Time of motion, repetitions after a contact included \[s\].
+    /// Time of motion, including repetitions after a contact \[s\].
     pub moved_s: f64,
-    /// Name of its complete log, without ending.
+    /// Name of the complete log of the step, without file extension.
     pub log: Option<String>,
-    /// Faults by contact, after which its motion was repeated.
+    /// Faults by contact, after which the motion of the step was repeated.
     pub contacts: Vec<String>,
 }
 
-/// Quality of a fit on motion that it has not seen.
+/// Quality of a fit on a motion that was not fitted.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct FitQuality {
     /// Torque left unexplained in the fitted motion, relative.
     pub training_relative: f64,
     /// Torque left unexplained in the validation motion, relative, over all joints.
     pub validation_relative: f64,
-    /// The same for the model that the fit started from.
+    /// The same value for the initial model of the fit.
     pub validation_relative_before: f64,
     /// Unexplained torque of each joint in the validation motion, RMS \[N m\].
     pub validation_rms_nm: Vec<f64>,
     /// Verdict of the identification.
     pub verdict: String,
-    /// Interval of the tracking error at 5 N/m that the validation motion allows the model of all motions; `None` for other models,
-    /// where there is no evidence, if the sinusoid is out of reach, and in files of older versions.
+    /// Interval of the tracking error at 5 N/m of the model of all motions, according to the validation motion; `None` for other
+    /// models, without sufficient data, if the sinusoid is out of reach, and in files of older versions.
     #[serde(default)]
     pub interval_at_5_n_per_m: Option<ErrorInterval>,
 }
@@ -111,20 +111,20 @@ pub struct FitQuality {
 /// Tracking of the sinusoid at 5 N/m.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SinusoidResult {
-    /// RMS error of the tip with the calibrated model alone \[m\]; `None` if a fault ended it.
+    /// RMS error of the tip with the calibrated model alone \[m\]; `None` if a fault ended the motion.
     pub calibrated_rms_m: Option<f64>,
-    /// RMS error after [`super::LEARNING_S`] of learning \[m\]; `None` if a fault ended it.
+    /// RMS error after [`super::LEARNING_S`] of learning \[m\]; `None` if a fault ended the motion.
     pub learning_rms_m: Option<f64>,
-    /// Folder of the model with what was learned, within that of the results; `None` if nothing was learned.
+    /// Folder of the model with the learned parameters, within the folder of the results; `None` if none were learned.
     #[serde(default)]
     pub learned_model: Option<String>,
     /// Contacts reported in free motion.
     pub false_contacts: usize,
-    /// The fault that ended it.
+    /// The fault that ended the motion.
     pub ended: Option<String>,
 }
 
-/// Everything that is known of a procedure.
+/// State and results of a procedure.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Progress {
     /// Name of the arm.
@@ -133,17 +133,17 @@ pub struct Progress {
     pub seed: u64,
     /// Finished steps, in order.
     pub finished: Vec<FinishedStep>,
-    /// Time of all motion, unfinished steps included \[s\].
+    /// Time of all motion, including unfinished steps \[s\].
     pub moved_s: f64,
-    /// Time of motion that was stated beforehand \[s\].
+    /// Time of motion that was predicted to the operator \[s\].
     pub stated_s: f64,
-    /// Finding of each joint's first ramp.
+    /// Result of the wiring check of each joint.
     pub wiring: Vec<JointWiring>,
     /// Swept space.
     pub sweep: Option<Sweep>,
     /// Breakaway torque of each joint.
     pub breakaway: Vec<JointBreakaway>,
-    /// The fit of the first pass; `None` if the model before it predicted the validation motion better.
+    /// The fit of the first pass; `None` if the initial model predicted the validation motion better.
     pub first_fit: Option<FitQuality>,
     /// The fit of all motions.
     pub fit: Option<FitQuality>,
@@ -156,7 +156,7 @@ pub struct Progress {
 }
 
 impl Progress {
-    /// The finished step of this name.
+    /// Returns the finished step of this name.
     pub fn finished(&self, step: StepName) -> Option<&FinishedStep> {
         self.finished.iter().find(|finished| finished.step == step)
     }
@@ -164,7 +164,7 @@ impl Progress {
     /// Reads the file in `folder`.
     ///
     /// # Errors
-    /// [`ProcedureError::Resume`] if there is none, or it is of another arm or seed.
+    /// [`ProcedureError::Resume`] if the file does not exist, or is of another arm or seed.
     pub fn read(folder: &Path, arm: &str, seed: u64) -> Result<Progress, ProcedureError> {
         let file = folder.join(FILE);
         let failed = |problem: String| ProcedureError::Resume {

@@ -1,11 +1,11 @@
-//! The space that the arm sweeps: box of all joint origins and of the tip, and its drawing.
+//! The space that the arm sweeps: a box that contains all joint origins and the tip, and a drawing of it.
 
 use std::fmt::Write;
 use supple_core::dynamics::{joint_poses, tip_pose};
 use supple_core::trajectory::Fourier;
 use supple_core::{Config, Vector};
 
-/// Poses of a period at which the arm is evaluated.
+/// Number of poses of each series and of each move at which the arm is evaluated.
 const POSES: usize = 400;
 /// Thickness of the arm about the lines between its joints, added on all sides \[m\].
 const THICKNESS_M: f64 = 0.1;
@@ -31,7 +31,7 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// Space of these motions, with the way between them in joint space.
+    /// Returns the space of these motions and of the moves between them in joint space.
     pub fn of<const N: usize>(
         config: &Config<N>,
         from_rad: &Vector<N>,
@@ -64,7 +64,7 @@ impl Sweep {
         sweep
     }
 
-    /// Whether another space lies within this one.
+    /// Returns whether the other space lies within this space.
     pub fn contains(&self, other: &Sweep) -> bool {
         let within = |axis: usize| {
             other.lower_m[axis] >= self.lower_m[axis] && other.upper_m[axis] <= self.upper_m[axis]
@@ -88,7 +88,7 @@ impl Sweep {
         tip_m
     }
 
-    /// One line of text.
+    /// Returns the space as one line of text.
     pub fn text(&self) -> String {
         let axis = |name: &str, i: usize| {
             format!("{name} {:.2} to {:.2} m", self.lower_m[i], self.upper_m[i])
@@ -96,7 +96,7 @@ impl Sweep {
         format!("{}, {}, {}", axis("x", 0), axis("y", 1), axis("z", 2))
     }
 
-    /// Drawing as SVG: from the side, from above and from the front, with the path of the tip.
+    /// Returns an SVG drawing: views from the side, from above and from the front, with the path of the tip.
     pub fn svg(&self) -> String {
         let (width, height) = (3.0 * VIEW_PX, VIEW_PX + 20.0);
         let mut svg = format!(

@@ -1,7 +1,7 @@
 //! Lower bounds of the collision and plausibility thresholds during a calibration, so that errors of the model cause no faults.
 //!
 //! Motors that give only a fraction of the commanded torque, and wrong masses, cause an error proportional to gravity. Arms
-//! without brakes also hold their pose by position loops in gravity hold: with a wrong model alone they would sink.
+//! without brakes also hold their pose by position loops in gravity hold, because with a wrong model they would sink otherwise.
 
 use super::error::ProcedureError;
 use super::motions::RAMP_LIMIT_NM;
@@ -29,7 +29,7 @@ const FIRST_FIT_AGAINST_SHARE: f64 = 0.35;
 /// Number of angles per joint of the grid of poses at which gravity is evaluated.
 const ANGLES_PER_JOINT: usize = 5;
 
-/// Minimum thresholds for `model`: that of the description, `before_first_fit`, or that of the first fit.
+/// Returns the minimum thresholds for `model`, which is the model of the description (`before_first_fit`) or of the first fit.
 ///
 /// # Errors
 /// A description that is not valid.
@@ -44,7 +44,7 @@ pub fn minimum_thresholds<const N: usize>(
         tip_force_n: 0.0,
         hold_pose: has_no_brakes,
         load_n: LOAD_N,
-        // Not raised: motion against its torque is how a motor of the wrong sign is detected.
+        // This threshold is not raised, because motion against the torque reveals a motor of the wrong sign.
         against_share: 0.0,
     };
     match (has_no_brakes, before_first_fit) {
@@ -78,7 +78,7 @@ pub fn minimum_thresholds<const N: usize>(
     })
 }
 
-/// Maximum gravity torque of each joint over a grid of poses within the joint limits \[N m\].
+/// Returns the maximum gravity torque of each joint over a grid of poses within the joint limits \[N m\].
 fn max_gravity_nm<const N: usize>(config: &Config<N>) -> Vector<N> {
     let (lower, upper) = (
         &config.limits.position_lower_rad,

@@ -1,40 +1,40 @@
-//! Whether each motor moves its own joint, in its direction, with torques of the right size: from short torque ramps on
-//! one joint after the other, and from the torque that holds the arm at rest.
+//! Checks whether each motor moves its own joint, in the correct direction, with torques of the correct size: from short torque
+//! ramps on one joint after the other, and from the torque that holds the arm at rest.
 //!
-//! A ramp needs no position loop on its joint; the loops of the others show whether those hold. The difference between a
-//! ramp up and a ramp down shows the direction, whatever gravity the model lacks.
+//! A ramp needs no position loop on its joint; the position loops hold the other joints. The difference between a
+//! ramp up and a ramp down reveals the direction, independent of the gravity that the model lacks.
 
 use super::error::ProcedureError;
 use crate::request_sequence::Recording;
 use serde::{Deserialize, Serialize};
 use supple_core::Vector;
 
-/// Motion of another encoder as a share of that of the ramped joint, above which it counts. A joint that the ramped one
-/// accelerates may move more: as much as a free one would by the model.
+/// Motion of another encoder relative to the motion of the ramped joint, above which the other joint counts as moved. A joint
+/// that the ramped joint accelerates may move more: as far as the model predicts for a free joint.
 const OTHER_SHARE: f64 = 0.5;
-/// Motion of an encoder that counts as motion of its joint: more than bristles and cables give \[rad\].
+/// Motion of an encoder that counts as motion of its joint: more than the deflection of bristles and cables \[rad\].
 const MOVED_RAD: f64 = 0.01;
-/// Gravity torque above which the torque at rest shows the scale \[N m\].
+/// Gravity torque above which the torque at rest reveals the torque scale \[N m\].
 const HEAVY_NM: f64 = 4.0;
-/// Factor between the holding torque and the model's gravity, above which units differ: first moments that are 28 % off and
-/// motors that give two thirds of what is commanded make 2.1.
+/// Factor between the holding torque and the model's gravity, above which units differ. First moments with an error of 28 % and
+/// motors that give two thirds of the commanded torque cause a factor of 2.1.
 const GRAVITY_FACTOR: f64 = 2.3;
 
-/// Finding for one joint.
+/// Result of the wiring check of one joint.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct JointWiring {
-    /// Whether its own encoder moved.
+    /// Whether the encoder of the joint moved.
     pub moved: bool,
     /// Other joints whose encoders moved.
     pub others: Vec<usize>,
     /// Greatest torque of the ramp \[N m\].
     pub torque_nm: f64,
-    /// Angle after the ramp up minus that after the ramp down, at the same time \[rad\].
+    /// Angle after the ramp up minus the angle after the ramp down, at the same time \[rad\].
     pub difference_rad: f64,
 }
 
-/// Evaluates a ramp of `rate_nm_per_s` on a joint: which encoders moved. `free_share` is how far each joint would move, as a
-/// share of the ramped one's travel, if nothing held it.
+/// Determines which encoders moved in a ramp of `rate_nm_per_s` on a joint. `free_share` returns the distance that each joint
+/// would move if it were free, relative to the travel of the ramped joint.
 pub fn ramp_result(
     recording: &Recording,
     joint: usize,
@@ -61,7 +61,7 @@ pub fn ramp_result(
     }
 }
 
-/// Angle of a joint in the ramp up minus that in the ramp down, at the end of the shorter one \[rad\].
+/// Returns the angle of a joint in the ramp up minus its angle in the ramp down, at the end of the shorter ramp \[rad\].
 pub fn difference_rad(up: &Recording, down: &Recording, joint: usize) -> f64 {
     let rows = up.t_s.len().min(down.t_s.len());
     if rows == 0 {
@@ -78,7 +78,7 @@ fn wrong(problem: String, remedy: &str) -> Result<(), ProcedureError> {
     })
 }
 
-/// Names what does not fit the description in the ramp of a joint.
+/// Checks that the result of a ramp agrees with the description; the error names the deviation.
 ///
 /// # Errors
 /// [`ProcedureError::Wiring`].
@@ -121,7 +121,7 @@ pub fn check_ramp(
     }
 }
 
-/// Rejects a joint that turns the other way.
+/// Rejects a joint that moves in the opposite direction.
 ///
 /// # Errors
 /// [`ProcedureError::Wiring`].
@@ -158,7 +158,7 @@ pub fn check_gravity<const N: usize>(
         if model_nm.abs() < HEAVY_NM + friction_nm[joint] {
             continue;
         }
-        // Dry friction may act either way at rest.
+        // At rest, dry friction may act in either direction.
         let lower_nm = model_nm.abs() / GRAVITY_FACTOR - friction_nm[joint];
         let upper_nm = model_nm.abs() * GRAVITY_FACTOR + friction_nm[joint];
         let along_nm = held_nm * model_nm.signum();

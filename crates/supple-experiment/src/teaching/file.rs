@@ -1,27 +1,27 @@
-//! The file of a motion: CSV with a header, one line for each sample.
+//! CSV file of a motion, with a header row and one line for each sample.
 //!
-//! Columns by name, in any order: `x_m`, `y_m`, `z_m` are the tip in base axes; with `time_s` the motion has its own times,
-//! without it the lines are waypoints; `q1_rad` and so on are the joints. Other columns are ignored.
+//! The columns may have any order: `x_m`, `y_m`, `z_m` are the tip position in base axes; `time_s` is the time of the sample, and
+//! without this column the lines are waypoints; `q1_rad` and so on are the joint angles. Other columns are ignored.
 
 use std::fmt::Write;
 use std::path::Path;
 use supple_core::math::Vector3;
 
-/// Longest file that is read \[bytes\].
+/// Maximum size of a file \[bytes\].
 const MAX_BYTES: u64 = 64 << 20;
-/// Longest motion \[s\].
+/// Maximum duration of a motion \[s\].
 const MAX_S: f64 = 3600.0;
-/// Speed below which the tip counts as not yet, or no longer, guided \[m/s\].
+/// Speed below which the tip counts as at rest before and after the motion \[m/s\].
 const REST_M_PER_S: f64 = 0.01;
 /// Time that is kept before and after the motion \[s\].
 const MARGIN_S: f64 = 0.3;
-/// Time over which that speed is taken \[s\].
+/// Time over which that speed is averaged \[s\].
 const SPEED_S: f64 = 0.1;
 
-/// Why a file is no motion.
+/// Error of a motion file.
 #[derive(Debug, thiserror::Error)]
 pub enum PointsError {
-    /// It cannot be read or written.
+    /// The file cannot be read or written.
     #[error("{file}: {source}; give a CSV file of a motion, as `supple teach` writes it")]
     File {
         /// The file.
@@ -40,7 +40,7 @@ pub enum PointsError {
         /// The column.
         column: &'static str,
     },
-    /// A value that is no finite number.
+    /// A value is not a finite number.
     #[error("{file}, line {line}: {column} is {value:?}: give a finite number")]
     Value {
         /// The file.
@@ -52,7 +52,7 @@ pub enum PointsError {
         /// Text found.
         value: String,
     },
-    /// A time that does not fit.
+    /// A time does not increase, or exceeds the maximum.
     #[error("{file}, line {line}: time_s is {value_s}: times must increase, over at most 3600 s")]
     Time {
         /// The file.
@@ -62,8 +62,8 @@ pub enum PointsError {
         /// Value found \[s\].
         value_s: f64,
     },
-    /// Too few lines.
-    #[error("{file}: it has {found} points: a motion needs at least {needed}")]
+    /// The file has too few lines.
+    #[error("{file}: the file has {found} points: a motion needs at least {needed}")]
     TooShort {
         /// The file.
         file: String,
@@ -81,11 +81,11 @@ pub struct RecordedMotion {
     pub time_s: Vec<f64>,
     /// Tip in base axes \[m\].
     pub tip_m: Vec<Vector3<f64>>,
-    /// Joint angles of each sample \[rad\]; empty if they are not known.
+    /// Joint angles of each sample \[rad\]; empty if unknown.
     pub joints_rad: Vec<Vec<f64>>,
 }
 
-/// What a file contains.
+/// Content of a file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Points {
     /// A motion with its times.
@@ -102,7 +102,7 @@ impl RecordedMotion {
         self.joints_rad.push(joints_rad.to_vec());
     }
 
-    /// Duration \[s\].
+    /// Returns the duration \[s\].
     pub fn duration_s(&self) -> f64 {
         match (self.time_s.first(), self.time_s.last()) {
             (Some(first), Some(last)) => last - first,
@@ -110,8 +110,7 @@ impl RecordedMotion {
         }
     }
 
-    /// The same motion without the time before and after it in which the tip rests, from time zero; `None` if it never
-    /// moves.
+    /// Returns the motion without the rest before and after it, beginning at time zero; `None` if the tip never moves.
     pub fn trimmed(&self) -> Option<RecordedMotion> {
         let moves = |i: usize| {
             let until = self.time_s[i] + SPEED_S;
@@ -142,7 +141,8 @@ impl RecordedMotion {
         })
     }
 
-    /// Tip at a time \[m\], linear between the samples; before and after them the first and the last.
+    /// Returns the tip position at a time \[m\]: interpolated linearly between samples, constant before the first and after the
+    /// last sample.
     pub fn tip_at(&self, time_s: f64) -> Vector3<f64> {
         let after = self.time_s.partition_point(|t| *t <= time_s);
         match (after.checked_sub(1), after < self.time_s.len()) {
@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn a_written_motion_is_read_as_it_was() {
+    fn a_written_motion_is_read_back_unchanged() {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("shown.csv");
         let recorded = recorded();
@@ -310,7 +310,7 @@ mod tests {
     }
 
     #[test]
-    fn points_without_times_are_waypoints_and_what_is_wrong_is_named() {
+    fn points_without_times_are_waypoints_and_errors_name_line_and_column() {
         let points = parse("name,z_m,x_m,y_m\na,3,1,2\n\n# no point\nb,6,4,5\n", "f");
         let expected = vec![Vector3::new(1.0, 2.0, 3.0), Vector3::new(4.0, 5.0, 6.0)];
         assert_eq!(points.ok(), Some(Points::Waypoints(expected)));

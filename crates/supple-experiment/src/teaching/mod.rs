@@ -1,7 +1,8 @@
-//! Motions that were shown by hand, or are given as points: read, planned within the limits, and repeated as set-points.
+//! Motions that were taught by hand, or are given as points: reads them, plans them within the limits, and repeats them as
+//! set-points.
 //!
-//! A [`RecordedMotion`] has times; [`time_waypoints`] gives times to points without any. [`Repetition::plan`] turns it into
-//! set-points that the controller's own checks accept, slower than recorded where the limits need that.
+//! A [`RecordedMotion`] has times; [`time_waypoints`] computes times for waypoints. [`Repetition::plan`] converts a motion to
+//! set-points that the controller's checks accept, slower than recorded if the limits require it.
 
 mod file;
 mod repetition;

@@ -11,15 +11,15 @@ use supple_core::{Controller, Reference, Trajectory, Vector};
 const SPACING_S: f64 = 0.04;
 /// Half of the time over which the motion is smoothed \[s\].
 const HALF_S: f64 = 0.06;
-/// Factor by which a motion that breaks a limit is slowed down at a time.
+/// Factor by which each attempt slows down a motion that exceeds a limit.
 const SLOWER: f64 = 1.1;
-/// Longest time between two set-points \[s\]: the slowest repetition.
+/// Maximum time between two set-points, which determines the slowest repetition \[s\].
 const MAX_SPACING_S: f64 = 0.8;
 
-/// Why a motion cannot be repeated.
+/// Reason why a motion cannot be repeated.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RepetitionError {
-    /// The controller would refuse it.
+    /// The controller would refuse a request of the motion.
     #[error("at {time_s:.2} s of the motion: {refusal}")]
     Refused {
         /// Time in the motion \[s\].
@@ -27,17 +27,17 @@ pub enum RepetitionError {
         /// The reason.
         refusal: Refusal,
     },
-    /// The arm cannot reach its start.
-    #[error("the start: {0}")]
+    /// The arm cannot reach the start of the motion.
+    #[error("start of the motion: {0}")]
     Start(String),
-    /// The speed asks for set-points too far apart.
+    /// The requested speed is too low: the time between set-points is too long.
     #[error(
         "at {speed} times the speed the set-points are {spacing_s:.2} s apart, more than {MAX_SPACING_S} s: choose a speed of at \
          least {}",
         SPACING_S / MAX_SPACING_S
     )]
     TooSlow {
-        /// Requested speed, as a multiple of that of the motion.
+        /// Requested speed, as a multiple of the speed of the motion.
         speed: f64,
         /// Time between two set-points \[s\].
         spacing_s: f64,
@@ -47,22 +47,22 @@ pub enum RepetitionError {
     NoMotion,
 }
 
-/// A motion to repeat, checked.
+/// A planned and checked repetition of a motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Repetition<const N: usize> {
-    /// Pose in which it starts \[rad\].
+    /// Start pose \[rad\].
     pub start_rad: Vector<N>,
     /// Set-points, the first one at rest at the start.
     pub points: Vec<Reference>,
     /// Cycles from one set-point to the next.
     pub spacing_cycles: u64,
-    /// Duration over that of the motion as recorded.
+    /// Duration of the repetition relative to the duration of the recorded motion.
     pub slowdown: f64,
 }
 
 impl<const N: usize> Repetition<N> {
-    /// Plans a motion at `speed` times its own, or slower where a limit needs it. The pose at the start is the recorded
-    /// one, or else any that reaches it.
+    /// Plans a repetition at `speed` times the recorded speed, or slower if a limit requires it. The start pose is the recorded
+    /// pose, or without one any pose that reaches the first point.
     ///
     /// # Errors
     /// [`RepetitionError`]: a motion out of reach, or one that is too fast or needs too much torque at every speed.
@@ -88,7 +88,7 @@ impl<const N: usize> Repetition<N> {
             _ => start_pose(config, "motion", &Trajectory::Hold(*tip_m), 0.0)
                 .map_err(|error| RepetitionError::Start(error.to_string()))?,
         };
-        // Rounded up, with a tolerance for the rounding of the division.
+        // The number is rounded up, with a tolerance for the rounding of the division.
         let cycles = |spacing_s: f64| (spacing_s / config.period_s - 1e-9).ceil().max(1.0) as u64;
         let mut spacing_cycles = cycles(SPACING_S / speed);
         let spacing_s = spacing_cycles as f64 * config.period_s;
@@ -121,7 +121,7 @@ impl<const N: usize> Repetition<N> {
         }
     }
 
-    /// The checks that the controller and its helper make, before anything moves.
+    /// Does the checks of the controller and its helper before any motion.
     fn check(&self, controller: &Controller<N>) -> Result<(), (f64, Refusal)> {
         let config = controller.config();
         let spacing_s = self.spacing_cycles as f64 * config.period_s;
@@ -160,23 +160,24 @@ impl<const N: usize> Repetition<N> {
         checked.map_err(|refusal| (reached_s, refusal))
     }
 
-    /// Where it starts.
+    /// Returns the hold at the first set-point, with which the repetition starts.
     pub fn start(&self) -> Trajectory {
         Trajectory::Hold(self.points[0].position)
     }
 
-    /// Number of requests.
+    /// Returns the number of requests.
     pub fn len(&self) -> usize {
         self.points.len() - 1
     }
 
-    /// Whether it has no requests; never of a planned motion.
+    /// Returns whether the repetition has no requests, which is never true of a planned repetition.
     pub fn is_empty(&self) -> bool {
         self.points.len() < 2
     }
 
-    /// Request number `k`, from 0, of a motion that starts in `start_cycle`, and the cycle in which it must take effect: that
-    /// in which the reference passes the set-point before, so that the motion does not depend on when requests arrive.
+    /// Returns request number `k`, from 0, of a motion that starts in `start_cycle`, and the cycle in which the request must take
+    /// effect. In that cycle the reference passes the previous set-point, so that the motion does not depend on when requests
+    /// arrive.
     pub fn request(&self, k: usize, start_cycle: u64) -> (Request<N>, u64) {
         let at_cycle = start_cycle + self.spacing_cycles * (k as u64 + 1);
         let point = &self.points[k + 1];
@@ -189,19 +190,19 @@ impl<const N: usize> Repetition<N> {
         (request, at_cycle - self.spacing_cycles)
     }
 
-    /// Cycle in which a motion that starts in `start_cycle` ends.
+    /// Returns the cycle in which a motion that starts in `start_cycle` ends.
     pub fn end_cycle(&self, start_cycle: u64) -> u64 {
         start_cycle + self.spacing_cycles * self.len() as u64
     }
 
-    /// The time in the recorded motion that is repeated in this cycle, from its first sample \[s\].
+    /// Returns the time in the recorded motion, from its first sample, that is repeated in this cycle \[s\].
     pub fn recorded_time_s(&self, start_cycle: u64, cycle: u64) -> f64 {
         let cycles = cycle.saturating_sub(start_cycle) as f64;
         SPACING_S * cycles / self.spacing_cycles as f64 - HALF_S
     }
 }
 
-/// The same point of a motion that takes `factor` times as long.
+/// Returns the same point of a motion that takes `factor` times as long.
 fn slower(point: &Reference, factor: f64) -> Reference {
     Reference {
         position: point.position,

@@ -1,17 +1,17 @@
-//! Position, velocity and acceleration of a sampled motion: a parabola through the samples around each time.
+//! Position, velocity and acceleration of a sampled motion, by fitting a parabola to the samples around each time.
 
 use super::RecordedMotion;
 use nalgebra::{Matrix3, Matrix3x1};
 use supple_core::Reference;
 use supple_core::math::Vector3;
 
-/// The motion at a time \[s\], from the samples within `half_s` before and after; it rests before its first and after its
-/// last sample.
+/// Returns the motion at a time \[s\], from the samples within `half_s` before and after; the tip rests before the first and
+/// after the last sample.
 pub fn reference_at(recorded: &RecordedMotion, time_s: f64, half_s: f64) -> Reference {
     let (Some(first_s), Some(last_s)) = (recorded.time_s.first(), recorded.time_s.last()) else {
         return Reference::at_rest(Vector3::zeros());
     };
-    // Samples on an even grid: those of the file, and those of the rest around them.
+    // The motion of the file and the rest before and after it are sampled on an even grid.
     const SAMPLES: i32 = 40;
     let mut normal = Matrix3::<f64>::zeros();
     let mut right = [Matrix3x1::<f64>::zeros(); 3];
@@ -27,7 +27,7 @@ pub fn reference_at(recorded: &RecordedMotion, time_s: f64, half_s: f64) -> Refe
         let at_s = time_s + half_s * f64::from(k) / f64::from(SAMPLES);
         add(at_s, &recorded.tip_at(at_s.clamp(*first_s, *last_s)));
     }
-    // Regular: the times of the grid differ.
+    // The matrix is regular, because the times of the grid differ.
     let inverse = normal.try_inverse().unwrap_or_else(Matrix3::zeros);
     let fits = right.map(|right| inverse * right);
     let part = |k: usize, factor: f64| Vector3::new(fits[0][k], fits[1][k], fits[2][k]) * factor;
@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_parabola_is_met_exactly_and_the_ends_rest() {
+    fn a_parabola_is_reproduced_exactly_and_the_motion_rests_beyond_its_ends() {
         let mut recorded = RecordedMotion::default();
         for k in 0..=400 {
             let t = 0.005 * f64::from(k);

@@ -1,4 +1,4 @@
-//! Times for points without any: a smooth path through them, passed as fast as speed and acceleration allow.
+//! Computes times for waypoints: a smooth path through them, passed as fast as the limits of speed and acceleration allow.
 //!
 //! The path is a cubic spline `p(s)` over its length `s`. With `x = s'^2` and the curvature `k(s)` the acceleration is
 //! `sqrt(s''^2 + k^2 x^2)`, its two parts being perpendicular. `x` is bounded by `v^2` and `a/k`; one pass backwards gives
@@ -9,23 +9,23 @@ use super::RecordedMotion;
 use nalgebra::DMatrix;
 use supple_core::math::Vector3;
 
-/// Most waypoints.
+/// Maximum number of waypoints.
 const MAX_POINTS: usize = 500;
-/// Shortest distance between two waypoints \[m\].
+/// Minimum distance between two waypoints \[m\].
 const MIN_DISTANCE_M: f64 = 1e-3;
-/// Intervals of the path for its timing.
+/// Number of intervals of the path in the computation of times.
 const INTERVALS: usize = 4000;
-/// Intervals between two waypoints from which the path's length is taken.
+/// Number of intervals between two waypoints in the computation of the path's length.
 const PER_POINT: usize = 200;
 /// Time over which the speed along the path is averaged \[s\].
 const SMOOTHING_S: f64 = 0.1;
 /// Time between two samples of the result \[s\].
 const SAMPLE_S: f64 = 0.005;
 
-/// Why waypoints are no path.
+/// Error of waypoints.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum WaypointError {
-    /// Too many of them.
+    /// There are too many waypoints.
     #[error(
         "{found} waypoints: give at most {MAX_POINTS}; with a column time_s a motion may have any number"
     )]
@@ -33,17 +33,17 @@ pub enum WaypointError {
         /// Points found.
         found: usize,
     },
-    /// Two that follow one another are the same.
+    /// Two consecutive waypoints are too close.
     #[error("waypoints {first} and {} are {distance_m} m apart: leave one of them out", first + 1)]
     TooClose {
-        /// The first of them, from 1.
+        /// Number of the first of the two, from 1.
         first: usize,
         /// Their distance \[m\].
         distance_m: f64,
     },
 }
 
-/// The motion through these points \[m\], from rest to rest, with at most this speed \[m/s\] and acceleration \[m/s^2\],
+/// Returns the motion through these points \[m\], from rest to rest, with at most this speed \[m/s\] and acceleration \[m/s^2\],
 /// both positive.
 ///
 /// # Errors
@@ -72,7 +72,7 @@ pub fn time_waypoints(
     Ok(sampled(&path, &times_s))
 }
 
-/// Cubic spline through points over the sum of their distances, free at both ends.
+/// Natural cubic spline through points, whose parameter is the sum of the distances between the points.
 struct Spline<'a> {
     points_m: &'a [Vector3<f64>],
     knots_m: Vec<f64>,
@@ -100,7 +100,7 @@ impl Spline<'_> {
                 right[(i, axis)] = 6.0 * change[axis];
             }
         }
-        // Diagonally dominant, so regular.
+        // The matrix is diagonally dominant, so it is regular.
         let solved = system.lu().solve(&right);
         let curves = solved.map_or_else(
             || vec![Vector3::zeros(); n],
@@ -117,7 +117,7 @@ impl Spline<'_> {
         }
     }
 
-    /// Point at a share of the way from one knot to the next \[m\].
+    /// Returns the point at a fraction of the interval from one knot to the next \[m\].
     fn at(&self, knot: usize, share: f64) -> Vector3<f64> {
         let h = self.knots_m[knot + 1] - self.knots_m[knot];
         let (a, b) = (1.0 - share, share);
@@ -144,23 +144,25 @@ fn even_path(spline: &Spline<'_>) -> Path {
     }
     let step_m = along_m[along_m.len() - 1] / INTERVALS as f64;
     let mut points_m = Vec::with_capacity(INTERVALS + 1);
-    let mut piece = 0;
+    let mut interval = 0;
     for k in 0..=INTERVALS {
         let at_m = step_m * k as f64;
-        while piece + 2 < along_m.len() && along_m[piece + 1] < at_m {
-            piece += 1;
+        while interval + 2 < along_m.len() && along_m[interval + 1] < at_m {
+            interval += 1;
         }
-        let share = (at_m - along_m[piece]) / (along_m[piece + 1] - along_m[piece]);
-        points_m.push(dense[piece] + (dense[piece + 1] - dense[piece]) * share.clamp(0.0, 1.0));
+        let share = (at_m - along_m[interval]) / (along_m[interval + 1] - along_m[interval]);
+        points_m.push(
+            dense[interval] + (dense[interval + 1] - dense[interval]) * share.clamp(0.0, 1.0),
+        );
     }
     Path { points_m, step_m }
 }
 
-/// Time at which each point of the path is passed \[s\].
+/// Returns the time of each point of the path \[s\].
 fn times(path: &Path, speed_m_per_s: f64, acceleration_m_per_s2: f64) -> Vec<f64> {
     let (h, a) = (path.step_m, acceleration_m_per_s2);
     let last = path.points_m.len() - 1;
-    // Over several steps, so that the chords of the dense path do not count as corners.
+    // The curvature is taken over several steps, so that the chords of the dense path do not count as corners.
     let reach = (INTERVALS / 200).min(last / 2).max(1);
     let curvature: Vec<f64> = (0..=last)
         .map(|i| {
@@ -174,7 +176,7 @@ fn times(path: &Path, speed_m_per_s: f64, acceleration_m_per_s2: f64) -> Vec<f64
         })
         .collect();
     let bound = |i: usize| (speed_m_per_s * speed_m_per_s).min(a / curvature[i].max(1e-9));
-    // Squared speeds from which the end can still be reached: x - 2 h sqrt(a^2 - (k x)^2) <= limit of the next.
+    // Maximum squared speeds from which the arm can stop at the end: x - 2 h sqrt(a^2 - (k x)^2) <= limit of the next point.
     let mut limit = vec![0.0; last + 1];
     for i in (0..last).rev() {
         let (c, k) = (limit[i + 1], curvature[i]);
@@ -197,7 +199,7 @@ fn times(path: &Path, speed_m_per_s: f64, acceleration_m_per_s2: f64) -> Vec<f64
     times_s
 }
 
-/// Samples of the motion at equal times, with the way along the path averaged over [`SMOOTHING_S`].
+/// Returns samples of the motion at equal time intervals, with the distance along the path averaged over [`SMOOTHING_S`].
 fn sampled(path: &Path, times_s: &[f64]) -> RecordedMotion {
     let length_m = path.step_m * (path.points_m.len() - 1) as f64;
     let way_m = |time_s: f64| {
@@ -314,7 +316,7 @@ mod tests {
     }
 
     #[test]
-    fn points_that_are_no_path_are_refused() {
+    fn too_many_or_too_close_waypoints_are_refused() {
         let twice = [Vector3::zeros(), Vector3::x(), Vector3::x()];
         let refused = time_waypoints(&twice, 1.0, 1.0);
         assert_eq!(

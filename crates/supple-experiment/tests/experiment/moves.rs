@@ -14,7 +14,7 @@ use supple_plant::PlantConfig;
 const ARMS: [&str; 5] = ["wam3", "wam4", "wam7", "openarm", "yam"];
 /// Poses for each arm.
 const POSES: usize = 40;
-/// Points on a move at which the speeds are differences.
+/// Number of points on a move at which speeds are computed from differences.
 const POINTS: u32 = 400;
 /// Mean speed of a move that no limit slows down \[rad/s\], and its minimum duration \[s\].
 const USUAL: (f64, f64) = (0.4, 0.5);
@@ -134,7 +134,7 @@ fn a_move_stays_below_low_limits_of_joints_and_tip() {
     }
 }
 
-/// Where the limits allow it, a move of the WAM takes the time that its mean speed gives.
+/// If the limits allow it, a move of the WAM has the usual mean speed.
 #[test]
 fn a_move_of_the_wam_within_the_limits_is_as_fast_as_usual() {
     let arm = Description::asset("wam4").expect("built in");

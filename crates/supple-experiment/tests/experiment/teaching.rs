@@ -1,5 +1,5 @@
-//! A motion that a hand shows to the floating arm is repeated: recorded, written, read, planned, and followed as
-//! set-points, as `supple teach` and `supple play` do it, in virtual time.
+//! A motion that is taught by guiding the floating arm by hand is recorded, written, read, planned, and repeated as
+//! set-points, as by `supple teach` and `supple play`, in virtual time.
 
 use supple_core::controller::{Mode, Request, check_motion};
 use supple_core::math::Vector3;
@@ -18,7 +18,7 @@ const SHOWN_S: f64 = 20.0;
 /// Cycles of gravity hold at the start.
 const SETTLE: u64 = 200;
 
-/// A hand that takes the tip around for 20 s: out, up, down, back, at some 0.1 m/s, with a rest on the way.
+/// A hand that guides the tip for 20 s: out, up, down, back, at some 0.1 m/s, with a rest between.
 fn hand() -> Hand {
     let path = [
         [0.5, 0.0, 0.0, 0.0],
@@ -55,7 +55,7 @@ impl Arm {
         config.law.gains = scenario::gains_like(&config.law.gains, stiffness_n_per_m);
         let mut plant = setup.plant(&variant, Scene::default());
         plant.hand = Some(hand());
-        // At home the arm is folded.
+        // In the home pose the arm is folded.
         let (sinusoid, duration_s) = setup.paths().sinusoid(1.0);
         let start_rad = start_pose(&config, "teaching", &sinusoid, duration_s).expect("in reach");
         let controller = Controller::new(config).expect("valid");
@@ -72,8 +72,8 @@ impl Arm {
         arm
     }
 
-    /// A cycle, with the checks of the helper; returns the number of the cycle, the mode, and the tip as the controller
-    /// sees it \[m\].
+    /// Runs a cycle, with the checks of the helper; returns the number of the cycle, the mode, and the tip position that the
+    /// controller computes \[m\].
     fn cycle(&mut self, request: Option<Request<N>>) -> (u64, Mode, Vector3<f64>) {
         if let Some(request) = &request {
             let checked = check_motion(&self.controller, &self.position_rad, request);
@@ -90,7 +90,7 @@ impl Arm {
         )
     }
 
-    /// Lets it be guided, and returns what was shown.
+    /// Guides the arm by hand, and returns the recorded motion.
     fn teach(&mut self) -> RecordedMotion {
         let mut shown = RecordedMotion::default();
         self.cycle(Some(Request::Float));
@@ -106,7 +106,7 @@ impl Arm {
         shown.trimmed().expect("it was guided")
     }
 
-    /// Repeats it; the error against what was shown, and the duration \[s\].
+    /// Repeats the motion; returns the error relative to the recorded motion, and the duration \[s\].
     fn play(&mut self, shown: &RecordedMotion, repetition: &Repetition<N>) -> (Rms, f64) {
         let config = *self.controller.config();
         let duration_s = approach_s(&config, &self.position_rad, &repetition.start_rad);
@@ -124,7 +124,7 @@ impl Arm {
         let mut error = Rms::default();
         let mut sent = 0;
         loop {
-            // Before the cycle in which it takes effect, as a queued request.
+            // The request is checked before the cycle in which it takes effect, like a queued request.
             let due = (sent < repetition.len()).then(|| repetition.request(sent, start));
             let request = due.filter(|(_, at)| *at == self.rig.plant().measurement().cycle);
             sent += usize::from(request.is_some());
@@ -142,11 +142,11 @@ impl Arm {
     }
 }
 
-/// Expected before the first run: 5 mm RMS everywhere. Reached at 25 N/m with the exact model (3.75 mm) and at 100 N/m with
-/// one as good as an identification (2.0 mm). At 5 N/m dry friction at rests and reversals leaves 9.9 and 19.6 mm, at 25 N/m
-/// with the identified model 5.4 mm: the bounds keep these figures.
+/// The expectation before the first run was 5 mm RMS in all cases. The error is 3.75 mm at 25 N/m with the exact model, and 2.0
+/// mm at 100 N/m with the errors of an identified model. At 5 N/m dry friction at rests and reversals causes 9.9 and 19.6 mm, at
+/// 25 N/m with the identified model 5.4 mm; the bounds are chosen for these values.
 #[test]
-fn twenty_seconds_shown_by_hand_are_repeated() {
+fn a_taught_motion_of_twenty_seconds_is_repeated() {
     let folder = tempfile::tempdir().expect("a folder");
     let identified = Some(Mismatch::identified(0));
     for (model, mismatch, stiffness_n_per_m, expected_m) in [
@@ -199,7 +199,7 @@ fn a_motion_beyond_the_limits_is_repeated_more_slowly_or_refused() {
     let arm = Arm::new(None, 5.0);
     let limits = arm.controller.config().limits;
     let start_m = arm.rig.plant().truth().tip_position_m;
-    // A metre per second and more, on 0.3 m.
+    // More than a metre per second over a distance of 0.3 m.
     let fast = |way_m: Vector3<f64>| {
         let mut shown = RecordedMotion::default();
         for k in 0..=60 {
@@ -226,7 +226,7 @@ fn a_motion_beyond_the_limits_is_repeated_more_slowly_or_refused() {
         matches!(beyond, Err(RepetitionError::Refused { .. })),
         "{beyond:?}"
     );
-    // Slower than the controller accepts set-points.
+    // The speed is too low for the maximum time between set-points.
     let too_slow = Repetition::plan(&arm.controller, &shown, 0.04);
     assert!(
         matches!(too_slow, Err(RepetitionError::TooSlow { speed: 0.04, .. })),

@@ -1,4 +1,4 @@
-//! The interval of the tracking error: which torques beyond the feed-forward count, and by how much.
+//! The interval of the tracking error, and the weight of residual torques in it.
 
 use nalgebra::DMatrix;
 use supple_core::dynamics::{jacobian, rnea};
@@ -6,7 +6,7 @@ use supple_core::{Config, Vector};
 use supple_experiment::{
     SinusoidRegion, error_interval, error_interval_of, feedforward_residual_nm, start_pose,
 };
-use supple_ident::{Mask, Motion};
+use supple_ident::{ExcludedInterval, Motion};
 use supple_model::Description;
 
 const RATE_HZ: f64 = 100.0;
@@ -28,8 +28,8 @@ fn centre(config: &Config<4>) -> Vector<4> {
     start_pose(config, "sinusoid", &trajectory, duration_s).expect("within reach")
 }
 
-/// All joints swing about the start of the sinusoid by 0.3 rad, with periods of about `period_s`, for ten of them; torques are
-/// zero.
+/// A motion in which all joints oscillate about the start of the sinusoid by 0.3 rad, for ten periods of about `period_s`;
+/// torques are zero.
 fn swinging(period_s: f64) -> Motion {
     let centre = centre(&config());
     let rows = (10.0 * period_s * RATE_HZ) as usize;
@@ -45,7 +45,7 @@ fn swinging(period_s: f64) -> Motion {
         cutoff_hz: None,
         start_s: 0.0,
         torque_delay_s: 0.0,
-        masks: Vec::new(),
+        excluded_intervals: Vec::new(),
     }
 }
 
@@ -80,7 +80,7 @@ fn a_constant_torque_deflects_the_tip_by_its_force_over_the_stiffness() {
 }
 
 #[test]
-fn friction_counts_as_much_as_a_constant_torque() {
+fn a_friction_error_has_the_same_weight_as_a_constant_torque() {
     let slow = swinging(8.0);
     let constant_m = upper_m(&slow, |_, _| 0.1);
     let friction_m = upper_m(&slow, |_, velocity| 0.1_f64.copysign(velocity));
@@ -101,12 +101,12 @@ fn noise_averages_out_and_torques_near_reversals_do_not_count() {
         false => 0.0,
     });
     assert_eq!(reversal_m, exact_m);
-    // What friction leaves at reversals even with an exact model, 3 mm on the WAM.
+    // Error by friction at reversals even with an exact model, 3 mm on the WAM.
     assert!((0.0025..0.0035).contains(&exact_m), "{exact_m}");
 }
 
 #[test]
-fn fast_motion_counts_little_beside_slow_motion() {
+fn fast_motion_has_little_weight_compared_with_slow_motion() {
     let (slow, fast) = (swinging(8.0), swinging(1.0));
     let mut both = slow.clone();
     let join = |a: &DMatrix<f64>, b: &DMatrix<f64>| {
@@ -129,7 +129,7 @@ fn fast_motion_counts_little_beside_slow_motion() {
 }
 
 #[test]
-fn the_feed_forward_leaves_nothing_of_its_own_torques_and_all_of_others() {
+fn the_feed_forward_residual_is_zero_for_its_own_torques_and_contains_all_other_torques() {
     let config = config();
     let mut motion = swinging(8.0);
     for i in 0..motion.samples() {
@@ -155,7 +155,7 @@ fn the_feed_forward_leaves_nothing_of_its_own_torques_and_all_of_others() {
 }
 
 #[test]
-fn there_is_no_interval_without_evidence() {
+fn there_is_no_interval_without_sufficient_motion() {
     let motion = swinging(8.0);
     let interval = |moving: &[usize], motion: &Motion| {
         let found = error_interval_of::<4>(&wam4(), moving, &[motion], STIFFNESS_N_PER_M);
@@ -180,7 +180,7 @@ fn there_is_no_interval_without_evidence() {
         .expect("the second has evidence");
     assert_eq!(found.worst.0, 1);
     let mut short = motion.clone();
-    short.masks.push(Mask {
+    short.excluded_intervals.push(ExcludedInterval {
         joint: Some(ELBOW),
         from_s: 3.0,
         to_s: 1e3,

@@ -1,7 +1,7 @@
 //! Corrections of a log's columns (sign, unit, order, zero, clock), compared by the residual of the fit to the corrected log.
 
 use super::finding::{Finding, Problem};
-use super::gravity::Gravities;
+use super::gravity::GravityComparison;
 use super::weighted_fit::{FitContext, FitResult, GramMatrices};
 use crate::error::IdentError;
 use crate::motion::Motion;
@@ -90,7 +90,7 @@ impl Correction {
     }
 }
 
-/// A correction, the fit with it, and the score that it gains over the fit to the log as given.
+/// A correction, the fit to the corrected log, and the gain of its score over the fit to the log as given.
 #[derive(Clone, Debug)]
 pub(super) struct Trial {
     pub correction: Correction,
@@ -98,8 +98,8 @@ pub(super) struct Trial {
     pub gain: f64,
 }
 
-/// All corrections without a continuous parameter.
-fn discrete(moving: &[usize]) -> Vec<Correction> {
+/// Returns all corrections without a continuous parameter.
+fn discrete(identified_joints: &[usize]) -> Vec<Correction> {
     let degrees = std::f64::consts::PI / 180.0;
     let mut all = vec![
         Correction::Angle(None, degrees),
@@ -107,11 +107,11 @@ fn discrete(moving: &[usize]) -> Vec<Correction> {
         Correction::Torque(None, -1.0),
         Correction::Reverse,
     ];
-    for (i, &a) in moving.iter().enumerate() {
+    for (i, &a) in identified_joints.iter().enumerate() {
         all.push(Correction::Angle(Some(a), -1.0));
         all.push(Correction::Torque(Some(a), -1.0));
         all.push(Correction::Angle(Some(a), degrees));
-        for &b in &moving[i + 1..] {
+        for &b in &identified_joints[i + 1..] {
             all.push(Correction::SwapAngles(a, b));
             all.push(Correction::SwapTorques(a, b));
             all.push(Correction::SwapJoints(a, b));
@@ -143,7 +143,7 @@ const SEARCHED_CORRECTIONS: [SearchedCorrection; 3] = [
     ),
 ];
 
-pub(super) struct Search<'a, const N: usize> {
+pub(super) struct CorrectionSearch<'a, const N: usize> {
     context: &'a FitContext<'a, N>,
     motion: &'a Motion,
     grams: GramMatrices,
@@ -151,7 +151,7 @@ pub(super) struct Search<'a, const N: usize> {
     before: f64,
 }
 
-impl<'a, const N: usize> Search<'a, N> {
+impl<'a, const N: usize> CorrectionSearch<'a, N> {
     pub fn new(
         context: &'a FitContext<'a, N>,
         motion: &'a Motion,
@@ -159,7 +159,7 @@ impl<'a, const N: usize> Search<'a, N> {
         let grams = context.grams(motion)?;
         let given = context.solve(&grams);
         let before = given.score();
-        let search = Search {
+        let search = CorrectionSearch {
             context,
             motion,
             grams,
@@ -169,11 +169,11 @@ impl<'a, const N: usize> Search<'a, N> {
         Ok((search, given))
     }
 
-    pub fn try_one(&self, correction: Correction) -> Result<Trial, IdentError> {
-        let moving = self.context.columns.moving();
+    pub fn try_correction(&self, correction: Correction) -> Result<Trial, IdentError> {
+        let identified_joints = self.context.columns.identified_joints();
         let after = match correction {
             Correction::Torque(Some(joint), factor) => {
-                let row = moving.binary_search(&joint).unwrap_or(0);
+                let row = identified_joints.binary_search(&joint).unwrap_or(0);
                 self.context.solve(&self.grams.scaled(row, factor))
             }
             _ => self.context.fit(&correction.apply(self.motion))?,
@@ -185,7 +185,7 @@ impl<'a, const N: usize> Search<'a, N> {
         })
     }
 
-    /// Whether the gain has a maximum at the correction's factor: it must be greater than at half and at twice the factor. Without
+    /// Returns whether the gain has a maximum at the correction's factor: it must be greater than at half and at twice the factor. Without
     /// this check a factor near zero would be accepted: it removes a joint from the fit, which always reduces the residual.
     fn is_a_maximum(&self, trial: &Trial) -> Result<bool, IdentError> {
         // A joint's angle and torque also affect its neighbours: a correction that reduces one residual and increases another
@@ -209,7 +209,7 @@ impl<'a, const N: usize> Search<'a, N> {
             _ => return Ok(true),
         };
         for correction in beside {
-            if self.try_one(correction)?.gain > 0.6 * trial.gain {
+            if self.try_correction(correction)?.gain > 0.6 * trial.gain {
                 return Ok(false);
             }
         }
@@ -233,20 +233,23 @@ impl<'a, const N: usize> Search<'a, N> {
         let ratio = 0.5 * (5.0_f64.sqrt() - 1.0);
         let mut best: Option<Trial> = None;
         let (mut c, mut d) = (b - ratio * (b - a), a + ratio * (b - a));
-        let (mut at_c, mut at_d) = (self.try_one(make(value(c)))?, self.try_one(make(value(d)))?);
+        let (mut at_c, mut at_d) = (
+            self.try_correction(make(value(c)))?,
+            self.try_correction(make(value(d)))?,
+        );
         for _ in 0..6 {
             if at_c.gain > at_d.gain {
                 b = d;
                 d = c;
                 at_d = at_c.clone();
                 c = b - ratio * (b - a);
-                at_c = self.try_one(make(value(c)))?;
+                at_c = self.try_correction(make(value(c)))?;
             } else {
                 a = c;
                 c = d;
                 at_c = at_d.clone();
                 d = a + ratio * (b - a);
-                at_d = self.try_one(make(value(d)))?;
+                at_d = self.try_correction(make(value(d)))?;
             }
             for trial in [&at_c, &at_d] {
                 if best.as_ref().is_none_or(|best| trial.gain > best.gain) {
@@ -257,23 +260,23 @@ impl<'a, const N: usize> Search<'a, N> {
         Ok(best.unwrap_or(at_c))
     }
 
-    /// The factor common to all angles: that of degrees, or a gear ratio that all joints share.
+    /// Returns the correction of all angles by a common factor: degrees, or a gear ratio that all joints share.
     fn common_factor(&self, degrees: &Trial) -> Result<Trial, IdentError> {
         let refined = self.refine(&|f| Correction::Angle(None, f), 0.004, 0.08, true)?;
         let better = refined.gain > degrees.gain + 0.02;
         Ok(if better { refined } else { degrees.clone() })
     }
 
-    /// All corrections without a continuous parameter, and the best of each kind with one; best first.
-    pub fn best(&self, moving: &[usize]) -> Result<Vec<Trial>, IdentError> {
+    /// Tries all corrections without a continuous parameter, and for each kind with one its best value; returns the best first.
+    pub fn best(&self, identified_joints: &[usize]) -> Result<Vec<Trial>, IdentError> {
         let mut all = Vec::new();
-        for correction in discrete(moving) {
-            all.push(self.try_one(correction)?);
+        for correction in discrete(identified_joints) {
+            all.push(self.try_correction(correction)?);
         }
-        for &joint in moving {
+        for &joint in identified_joints {
             for (make, starts, logarithmic) in SEARCHED_CORRECTIONS {
                 let make = |value: f64| make(joint, value);
-                let trial = starts.iter().map(|v| self.try_one(make(*v)));
+                let trial = starts.iter().map(|v| self.try_correction(make(*v)));
                 let trial = trial.collect::<Result<Vec<_>, _>>()?;
                 let gains = trial.iter().map(|t| t.gain);
                 let (at, gain) = gains.enumerate().fold((0, f64::MIN), |best, (i, gain)| {
@@ -318,12 +321,12 @@ pub(super) fn check<const N: usize>(
     context: &FitContext<'_, N>,
     motion: &Motion,
 ) -> Result<Vec<Finding>, IdentError> {
-    let moving = context.columns.moving().to_vec();
+    let identified_joints = context.columns.identified_joints().to_vec();
     let mut motion = motion.clone();
     let mut findings = Vec::new();
     for _ in 0..2 {
-        let (search, given) = Search::new(context, &motion)?;
-        let trial = search.best(&moving)?;
+        let (search, given) = CorrectionSearch::new(context, &motion)?;
+        let trial = search.best(&identified_joints)?;
         let Some(best) = trial.first() else { break };
         if best.gain < best.correction.threshold() {
             findings.extend(zero(context, &motion)?);
@@ -339,20 +342,20 @@ pub(super) fn check<const N: usize>(
     Ok(findings)
 }
 
-/// A wrong zero of an angle, found by comparing the fitted gravity torques with those of the given arm: a constant error of an
-/// angle changes the residual little, but rotates the arm beyond that joint.
+/// Finds a wrong zero of an angle by comparing the fitted gravity torques with those of the given arm: a constant error of an
+/// angle changes the residual little, but rotates the links beyond that joint.
 fn zero<const N: usize>(
     context: &FitContext<'_, N>,
     motion: &Motion,
 ) -> Result<Option<Finding>, IdentError> {
     let context = context.with_tight_prior()?;
-    let (search, given) = Search::new(&context, motion)?;
+    let (search, given) = CorrectionSearch::new(&context, motion)?;
     let given = &given;
-    let gravities = Gravities::new(&context, motion, given);
+    let gravities = GravityComparison::new(&context, motion, given);
     let Some((joint, by, before, after)) = gravities.zero() else {
         return Ok(None);
     };
-    let trial = search.try_one(Correction::Zero(joint, by))?;
+    let trial = search.try_correction(Correction::Zero(joint, by))?;
     if trial.gain < 0.01 {
         return Ok(None);
     }

@@ -31,7 +31,7 @@ pub(super) fn quantum(values: &[f64]) -> f64 {
     let range = values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
         - values.iter().copied().fold(f64::INFINITY, f64::min);
     let changes = values.windows(2).map(|w| (w[1] - w[0]).abs());
-    // Differences of rounding are no quantum.
+    // Ignore differences due to rounding.
     let changes = changes.filter(|change| *change > 1e-9 * range);
     changes.fold(f64::INFINITY, f64::min)
 }

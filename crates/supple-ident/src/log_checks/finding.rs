@@ -1,4 +1,4 @@
-//! What a check of a log found.
+//! Findings of the checks of a log.
 
 use std::fmt;
 
@@ -9,13 +9,13 @@ pub enum Problem {
     TimeUnit,
     /// Clock too fast or too slow by a factor.
     TimeScale,
-    /// Samples are missing, the times do not show it.
+    /// Samples are missing although the times are regular.
     LostSamples,
     /// Angles in degrees.
     Degrees,
     /// Angles of the motors instead of the joints.
     MotorAngles,
-    /// Angle by a wrong factor: gear ratio or scale.
+    /// Angle multiplied by a wrong factor: gear ratio or scale.
     AngleScale,
     /// Angle with the wrong sign.
     AngleSign,
@@ -23,7 +23,7 @@ pub enum Problem {
     ZeroOffset,
     /// Torque with the wrong sign.
     TorqueSign,
-    /// Torque by a wrong factor.
+    /// Torque multiplied by a wrong factor.
     TorqueScale,
     /// Currents, or torques of the motors, instead of torques of the joints.
     NotJointTorques,
@@ -31,21 +31,21 @@ pub enum Problem {
     TorqueOffset,
     /// Two joints are exchanged in angle, torque or both.
     Swapped,
-    /// Angles that stand while the joint moves.
+    /// Angles that do not change while the joint moves.
     FrozenAngle,
-    /// Torques that stand while the joint moves.
+    /// Torques that do not change while the joint moves.
     FrozenTorque,
-    /// A column that is refreshed at a lower rate than the log's.
+    /// A column that is updated at a lower rate than the rate of the log.
     Held,
     /// Torque at its limit.
     Saturated,
-    /// Torque that for a time is not the arm's own.
+    /// Torque that is for some time not explained by the arm alone.
     Contact,
-    /// A weight at the tip that the given arm does not have.
+    /// A payload at the tip that the given arm does not have.
     Payload,
 }
 
-/// What follows from a finding.
+/// Consequence of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Consequence {
     /// The log is not fitted.
@@ -61,13 +61,13 @@ pub enum Consequence {
 pub struct Finding {
     /// Kind of error.
     pub problem: Problem,
-    /// What follows.
+    /// Consequence.
     pub consequence: Consequence,
     /// Joints concerned, counted from 0; empty if it concerns the whole log.
     pub joints: Vec<usize>,
-    /// Where: column, such as `q[2]`, or `t`.
+    /// Column, such as `q[2]`, or `t`.
     pub column: String,
-    /// What was found, with numbers.
+    /// Evidence for the finding, with numbers.
     pub evidence: String,
     /// Correction.
     pub remedy: String,

@@ -13,16 +13,15 @@ use supple_core::dynamics::{regressor, regressor_times};
 const MAX_RATIO: f64 = 3.0;
 /// Minimum ratio of the sums of squares of gravity and measured torque at which a joint is compared.
 const MIN_GRAVITY_RATIO: f64 = 0.04;
-/// Correlation of the fitted gravity torques with the given ones below which a zero of an angle may be wrong; with the right
-/// zero it is above.
+/// Minimum correlation of the fitted gravity torques with the given ones; below it a zero of an angle may be wrong.
 const MIN_CORRELATION: f64 = 0.985;
 /// Minimum zero offset that is reported \[rad\].
 const MIN_OFFSET_RAD: f64 = 0.08;
 /// Minimum payload that is reported, as a fraction of the arm's mass.
 const MIN_PAYLOAD: f64 = 0.11;
 
-/// Gravity torques of moving joints at the poses of a log.
-pub(super) struct Gravities<'a, const N: usize> {
+/// Fitted and given gravity torques of the identified joints at the poses of a log.
+pub(super) struct GravityComparison<'a, const N: usize> {
     context: &'a FitContext<'a, N>,
     poses: Vec<Vector<N>>,
     found: Vec<Vector<N>>,
@@ -41,7 +40,7 @@ fn correlation<const N: usize>(a: &[Vector<N>], b: &[Vector<N>], joint: usize) -
     product(a, b, joint) / squares.sqrt().max(f64::MIN_POSITIVE)
 }
 
-impl<'a, const N: usize> Gravities<'a, N> {
+impl<'a, const N: usize> GravityComparison<'a, N> {
     pub fn new(context: &'a FitContext<'a, N>, motion: &Motion, fit: &FitResult) -> Self {
         let every = (motion.samples() / 200).max(1);
         let rows = (0..motion.samples()).step_by(every);
@@ -54,8 +53,8 @@ impl<'a, const N: usize> Gravities<'a, N> {
                 .map(|i| motion.tau[(i, j)].powi(2))
                 .sum::<f64>()
         };
-        let moving = context.columns.moving();
-        let heaviest = moving
+        let identified_joints = context.columns.identified_joints();
+        let heaviest = identified_joints
             .iter()
             .map(|j| product(&given, &given, *j))
             .fold(0.0, f64::max);
@@ -63,8 +62,8 @@ impl<'a, const N: usize> Gravities<'a, N> {
             let weight = product(&given, &given, *j);
             weight > MIN_GRAVITY_RATIO * torque(*j) && weight > 0.01 * heaviest
         };
-        let heavy = moving.iter().copied().filter(holds).collect();
-        Gravities {
+        let heavy = identified_joints.iter().copied().filter(holds).collect();
+        GravityComparison {
             context,
             poses,
             found,
@@ -80,7 +79,7 @@ impl<'a, const N: usize> Gravities<'a, N> {
         self.heavy.iter().map(ratio).collect()
     }
 
-    /// Torques in another unit: the fitted gravity torques are a small fraction, or a multiple, of the given ones.
+    /// Reports torques in another unit: the fitted gravity torques are a small fraction, or a multiple, of the given ones.
     pub fn unit(&self) -> Option<Finding> {
         let ratios = self.ratios();
         if ratios.is_empty() {
@@ -127,15 +126,15 @@ impl<'a, const N: usize> Gravities<'a, N> {
         moved.collect()
     }
 
-    /// A wrong zero: joint, change of its angle \[rad\] with which the fitted gravity torques agree with the given ones, and the
-    /// correlations without and with it.
+    /// Finds a wrong zero. Returns the joint, the change of its angle \[rad\] with which the fitted gravity torques agree with
+    /// the given ones, and the correlations without and with this change.
     pub fn zero(&self) -> Option<(usize, f64, f64, f64)> {
         let before = self.min_correlation(None);
         if self.heavy.is_empty() || before > MIN_CORRELATION {
             return None;
         }
         let mut best = (0, 0.0, before);
-        for &joint in self.context.columns.moving() {
+        for &joint in self.context.columns.identified_joints() {
             for k in -31..=31 {
                 let by = 0.1 * f64::from(k);
                 let after = self.min_correlation(Some((joint, by)));
@@ -156,7 +155,7 @@ impl<'a, const N: usize> Gravities<'a, N> {
         (enough && by.abs() >= MIN_OFFSET_RAD).then_some((joint, by, before, after))
     }
 
-    /// A point mass at the tip that accounts for the difference from the given gravity torques.
+    /// Reports a payload: a point mass at the tip that explains the difference from the given gravity torques.
     pub fn payload(&self) -> Option<Finding> {
         let arm = self.context.arm;
         let tip = arm.link_from_joint(N - 1) * arm.joint_from_tip().translation;

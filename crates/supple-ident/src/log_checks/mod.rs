@@ -10,7 +10,7 @@
 //!   determines the signs.
 //! - `unexplained_torque`: residual torques at some times (contact), or in all poses (torques in another unit, a payload, an offset).
 //!
-//! No threshold depends on the arm: each is relative to what the log itself shows, or to the gravity torques of the given arm.
+//! No threshold depends on the arm: each is relative to the data of the log itself, or to the gravity torques of the given arm.
 
 mod corrections;
 mod equal_values;
@@ -31,27 +31,27 @@ use supple_core::Arm;
 
 /// Maximum number of samples of a log to which the corrections are fitted.
 const CORRECTION_SAMPLES: f64 = 300.0;
-/// Minimum number of reversals of each moving joint in a log that is compared with a model.
+/// Minimum number of reversals of each identified joint in a log that is compared with a model.
 const MIN_REVERSALS: usize = 3;
 /// Minimum speed, as a fraction of the joint's peak speed, at which its direction counts.
 const DIRECTION_SPEED_FRACTION: f64 = 0.1;
 /// Maximum cutoff frequency of the filter for these checks, and the one of `sampling` if none is given \[Hz\].
 const MAX_CUTOFF_HZ: f64 = 8.0;
 
-/// Checks `log` against `arm`, of which `moving` joints move. `couplings` and the torque's delay are those of the fit.
+/// Checks `log` against `arm`, for the joints `identified_joints`. `couplings` and the torque's delay are those of the fit.
 ///
 /// # Errors
 /// Shapes that do not agree, values that are not finite, times that do not increase.
 pub fn check_log<const N: usize>(
     arm: &Arm<N>,
     log: &Log,
-    moving: &[usize],
+    identified_joints: &[usize],
     couplings: &[(usize, usize)],
     preparation: &Preparation,
 ) -> Result<Vec<Finding>, IdentError> {
-    log.check_table(N, moving)?;
+    log.check_table(N, identified_joints)?;
     let cutoff_hz = preparation.cutoff_hz.unwrap_or(MAX_CUTOFF_HZ);
-    let mut findings = sampling::check(log, moving, cutoff_hz);
+    let mut findings = sampling::check(log, identified_joints, cutoff_hz);
     if findings.iter().any(|f| f.problem == Problem::TimeUnit) {
         return Ok(findings);
     }
@@ -59,7 +59,7 @@ pub fn check_log<const N: usize>(
         .iter()
         .all(|f| f.consequence != Consequence::Reject)
     {
-        findings.extend(velocity::check(log, moving));
+        findings.extend(velocity::check(log, identified_joints));
     }
     let rejected = |findings: &[Finding]| {
         let rejects = |f: &Finding| f.consequence == Consequence::Reject;
@@ -69,12 +69,15 @@ pub fn check_log<const N: usize>(
         return Ok(findings);
     }
     let whole = resample_whole(log, preparation)?;
-    if moving.iter().any(|&joint| !turns_around(&whole, joint)) {
+    if identified_joints
+        .iter()
+        .any(|&joint| !reverses_often(&whole, joint))
+    {
         findings.extend(many_revolutions(log, &findings));
         return Ok(findings);
     }
     let middle = resample_middle(log, preparation)?;
-    let context = weighted_fit::FitContext::new(arm, moving, couplings)?;
+    let context = weighted_fit::FitContext::new(arm, identified_joints, couplings)?;
     findings.extend(corrections::check(&context, &middle)?);
     findings.extend(many_revolutions(log, &findings));
     if !rejected(&findings) {
@@ -83,9 +86,9 @@ pub fn check_log<const N: usize>(
     Ok(findings)
 }
 
-/// Whether a joint reverses its direction at least [`MIN_REVERSALS`] times. In a motion in one direction an offset cannot be told
-/// from dry friction.
-fn turns_around(motion: &Motion, joint: usize) -> bool {
+/// Returns whether a joint reverses its direction at least [`MIN_REVERSALS`] times. A motion in one direction does not
+/// distinguish an offset from dry friction.
+fn reverses_often(motion: &Motion, joint: usize) -> bool {
     let speeds = motion.qd.column(joint);
     let min = DIRECTION_SPEED_FRACTION * speeds.amax();
     let mut reversals = 0;
@@ -146,15 +149,15 @@ fn resample(log: &Log, preparation: &Preparation, rate_hz: f64) -> Result<Motion
     // The filter acts at the log's own rate; at the reduced rate its cutoff must stay below half of it.
     let span_s = log.t_s[log.t_s.len() - 1] - log.t_s[0];
     let own_hz = (log.t_s.len() - 1) as f64 / span_s;
-    let keep_every = (own_hz / rate_hz).floor().max(1.0) as usize;
-    let cutoff_hz = MAX_CUTOFF_HZ.min(0.4 * own_hz / keep_every as f64);
+    let decimation_factor = (own_hz / rate_hz).floor().max(1.0) as usize;
+    let cutoff_hz = MAX_CUTOFF_HZ.min(0.4 * own_hz / decimation_factor as f64);
     // Reports a cutoff that is not possible at this rate before the log is filtered.
     LowPass::butterworth4(cutoff_hz, own_hz)?;
     let preparation = Preparation {
         rate_hz: None,
         cutoff_hz: Some(cutoff_hz),
-        keep_every,
+        decimation_factor,
         ..*preparation
     };
-    Motion::of_checked(log, &preparation)
+    Motion::from_checked_log(log, &preparation)
 }

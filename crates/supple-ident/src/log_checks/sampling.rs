@@ -6,19 +6,19 @@ use crate::log::Log;
 
 /// Plausible sampling rates; a rate outside means that the time is not in seconds \[Hz\].
 const RATES_HZ: std::ops::RangeInclusive<f64> = 8.0..=30_000.0;
-/// Minimum time without a change at which a column is frozen \[s\].
+/// Minimum time without a change after which a column counts as frozen \[s\].
 const MIN_FROZEN_S: f64 = 0.1;
 /// Minimum number of changes of a column per period of the cutoff frequency: with fewer, its steps are within the frequencies
 /// that are fitted, and it counts as held.
 const REFRESHES_PER_PERIOD: f64 = 6.0;
-/// Minimum ratio of a step, equal for all joints, to its neighbours at which samples were lost.
+/// Minimum ratio of a step to its neighbours, equal for all joints, that indicates lost samples.
 const MIN_LOST_RATIO: f64 = 1.6;
-/// Minimum ratio of the speed of a joint to what its speed changes from step to step, at which lost samples are looked for.
+/// Minimum ratio of a joint's speed to its change from step to step for the check of lost samples.
 const SPEED_TO_NOISE: f64 = 5.0;
-/// Of independent errors of the angles: the deviation of a change of the speed over that of its second difference.
+/// For independent errors of the angles: ratio of the deviation of a speed change to the deviation of its second difference.
 const BEND_TO_CHANGE: f64 = 0.548;
 
-pub(super) fn check(log: &Log, moving: &[usize], cutoff_hz: f64) -> Vec<Finding> {
+pub(super) fn check(log: &Log, identified_joints: &[usize], cutoff_hz: f64) -> Vec<Finding> {
     let steps: Vec<f64> = log.t_s.windows(2).map(|w| w[1] - w[0]).collect();
     let step_s = median(steps);
     if let Some(finding) = time_unit(step_s) {
@@ -26,7 +26,7 @@ pub(super) fn check(log: &Log, moving: &[usize], cutoff_hz: f64) -> Vec<Finding>
     }
     let mut findings = Vec::new();
     let mut frozen = false;
-    for &joint in moving {
+    for &joint in identified_joints {
         let angles: Vec<f64> = log.q_rad.column(joint).iter().copied().collect();
         let torques: Vec<f64> = log.tau_nm.column(joint).iter().copied().collect();
         let held = held(&angles, "q", joint, step_s, cutoff_hz);
@@ -42,7 +42,7 @@ pub(super) fn check(log: &Log, moving: &[usize], cutoff_hz: f64) -> Vec<Finding>
         findings.extend(saturated(log, &torques, joint));
     }
     if !frozen && !findings.iter().any(|f| f.problem == Problem::Held) {
-        findings.extend(lost_samples(log, moving, step_s));
+        findings.extend(lost_samples(log, identified_joints, step_s));
     }
     findings
 }
@@ -78,7 +78,7 @@ fn slope_before(log: &Log, angles: &[f64], i: usize, step_s: f64) -> Option<f64>
     Some((angles[i] - angles[from]) / (log.t_s[i] - log.t_s[from]))
 }
 
-/// An angle that stops changing within one sample while the joint moves, and later jumps to the true angle.
+/// Finds an angle that stops changing within one sample while the joint moves, and later jumps to the true angle.
 fn frozen_angle(log: &Log, angles: &[f64], joint: usize, step_s: f64) -> Option<Finding> {
     let quantum = quantum(angles);
     let column = log.q_rad.column(joint);
@@ -125,10 +125,10 @@ fn mean_run_length(all: &[Run]) -> f64 {
     squares / total
 }
 
-/// A column that changes by large steps, rarely and at a constant rate.
+/// Finds a column that changes by large steps, rarely and at a constant rate.
 fn held(values: &[f64], name: &str, joint: usize, step_s: f64, cutoff_hz: f64) -> Option<Finding> {
     let all = runs(values);
-    // Longer runs are rests of the arm.
+    // Ignore longer runs: the arm is at rest.
     let short: Vec<Run> = all
         .iter()
         .filter(|run| (run.len() as f64) * step_s < 0.5)
@@ -231,7 +231,7 @@ fn mean_run_length_without(all: &[Run], left_out: &Run) -> f64 {
     }
 }
 
-/// Torque that rests on its largest value in either direction.
+/// Finds a torque that stays at its maximum in either direction.
 fn saturated(log: &Log, torques: &[f64], joint: usize) -> Option<Finding> {
     let high = torques.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let low = torques.iter().copied().fold(f64::INFINITY, f64::min);
@@ -246,7 +246,8 @@ fn saturated(log: &Log, torques: &[f64], joint: usize) -> Option<Finding> {
     for (end, inward) in [(high, -1.0), (low, 1.0)] {
         let at = |x: f64| (x - end).abs() <= 1e-9 * range;
         let here = torques.iter().filter(|x| at(**x)).count();
-        // As many samples within the next quantum, or the next hundredth of the range, as on the limit: no limit.
+        // If as many samples are within the next quantum, or the next hundredth of the range, as at the extreme value, the value
+        // is not a limit.
         let next = quantum.max(0.01 * range) * 1.5;
         let near = torques
             .iter()
@@ -284,14 +285,14 @@ fn saturated(log: &Log, torques: &[f64], joint: usize) -> Option<Finding> {
     Some(finding)
 }
 
-/// Steps in which all joints travel several times as far as in the steps around: time passed that the clock lacks.
-fn lost_samples(log: &Log, moving: &[usize], step_s: f64) -> Option<Finding> {
+/// Finds steps in which all joints travel several times as far as in the neighbouring steps: samples are missing there.
+fn lost_samples(log: &Log, identified_joints: &[usize], step_s: f64) -> Option<Finding> {
     let n = log.t_s.len();
     let reach = 4;
     if n < 4 * reach {
         return None;
     }
-    let quanta: Vec<f64> = moving
+    let quanta: Vec<f64> = identified_joints
         .iter()
         .map(|&j| quantum(log.q_rad.column(j).clone_owned().as_slice()))
         .collect();
@@ -300,7 +301,7 @@ fn lost_samples(log: &Log, moving: &[usize], step_s: f64) -> Option<Finding> {
     let (mut places, mut lost_s, mut first_s) = (0, 0.0, None);
     let (mut jumps, mut jump_s) = (0, 0.0);
     // The step at nearly the largest speed of each joint.
-    let fastest: Vec<f64> = moving
+    let fastest: Vec<f64> = identified_joints
         .iter()
         .map(|&j| {
             let mut steps: Vec<f64> = (0..n - 1).map(|i| step(i, j).abs()).collect();
@@ -311,7 +312,7 @@ fn lost_samples(log: &Log, moving: &[usize], step_s: f64) -> Option<Finding> {
     for i in reach..n - 1 - reach {
         let mut ratios = Vec::new();
         let mut leaps = 0;
-        for (row, &j) in moving.iter().enumerate() {
+        for (row, &j) in identified_joints.iter().enumerate() {
             let speed = |k: usize| step(k, j) / span(k);
             let around = (i - reach..i).chain(i + 1..=i + reach);
             let speeds: Vec<f64> = around.map(speed).collect();
@@ -322,21 +323,21 @@ fn lost_samples(log: &Log, moving: &[usize], step_s: f64) -> Option<Finding> {
             let spread = median(speeds.iter().map(|v| v.abs()).collect());
             let largest = speeds.iter().map(|v| v.abs()).fold(0.0, f64::max);
             let usual = mean_of_middle(speeds) * span(i);
-            // A smaller speed is not told from the noise of the encoder.
+            // A smaller speed cannot be distinguished from the noise of the encoder.
             let fine = (5.0 * quanta[row]).max(SPEED_TO_NOISE * noise * span(i));
             if step(i, j).abs() > (8.0 * largest * span(i)).max(3.0 * fastest[row]) {
                 leaps += 1;
             }
-            // A joint that turns around has no speed to compare with.
+            // A joint that reverses has no speed to compare with.
             if usual.abs() > 0.7 * spread * span(i) && usual.abs() > fine {
                 ratios.push(step(i, j) / usual);
             }
         }
-        if leaps >= 2 || (leaps == 1 && moving.len() == 1) {
+        if leaps >= 2 || (leaps == 1 && identified_joints.len() == 1) {
             jumps += 1;
             jump_s = log.t_s[i];
         }
-        if ratios.len() < moving.len().min(2) || ratios.is_empty() {
+        if ratios.len() < identified_joints.len().min(2) || ratios.is_empty() {
             continue;
         }
         let ratio = median(ratios.clone());

@@ -2,7 +2,7 @@
 
 use super::equal_values::median;
 use super::finding::{Consequence, Finding, Problem};
-use super::gravity::Gravities;
+use super::gravity::GravityComparison;
 use super::weighted_fit::{FitContext, FitResult};
 use crate::columns::Column;
 use crate::error::IdentError;
@@ -28,7 +28,7 @@ pub(super) fn check<const N: usize>(
     let mut findings = Vec::new();
     let residuals = residuals(context, motion, &fit)?;
     findings.extend(contacts(context, motion, &fit, &residuals));
-    let gravities = Gravities::new(context, motion, &fit);
+    let gravities = GravityComparison::new(context, motion, &fit);
     findings.extend(gravities.unit());
     findings.extend(gravities.payload());
     findings.extend(offsets(context, motion, &fit));
@@ -47,8 +47,8 @@ fn residuals<const N: usize>(
         .collect())
 }
 
-/// Intervals in which the residual of a joint is far above its usual size, largest residual first; one finding for each
-/// joint. What lasts longer than a contact is no such interval: the model is wrong there.
+/// Finds intervals in which the residual of a joint is far above its usual size, largest residual first; one finding for each
+/// joint. Longer intervals than [`MAX_CONTACT_S`] are ignored: the model is wrong there.
 fn contacts<const N: usize>(
     context: &FitContext<'_, N>,
     motion: &Motion,
@@ -56,7 +56,7 @@ fn contacts<const N: usize>(
     residuals: &[DVector<f64>],
 ) -> Vec<Finding> {
     let mut findings: Vec<Finding> = Vec::new();
-    for (residual, &joint) in residuals.iter().zip(context.columns.moving()) {
+    for (residual, &joint) in residuals.iter().zip(context.columns.identified_joints()) {
         let mut sizes: Vec<f64> = residual.iter().map(|r| r.abs()).collect();
         // Standard deviation of a normal distribution with this median.
         let usual_nm = 1.4826 * median(sizes.clone());
@@ -106,8 +106,8 @@ fn contacts<const N: usize>(
     findings
 }
 
-/// Peaks of at least `bound`, largest first, each with the samples around it above `level` and above a fifth of it. The
-/// values of these samples are set to zero.
+/// Returns peaks of at least `bound`, largest first, each with the surrounding samples above `level` and above a fifth of the
+/// peak. The values of these samples are set to zero.
 fn peaks(sizes: &mut [f64], bound: f64, level: f64) -> Vec<(f64, Range<usize>)> {
     let mut found = Vec::new();
     while let Some((at, &peak)) = sizes.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)) {
@@ -125,14 +125,14 @@ fn peaks(sizes: &mut [f64], bound: f64, level: f64) -> Vec<(f64, Range<usize>)> 
     found
 }
 
-/// Offsets of more than 1.5 times the dry friction: in one direction the joint would be driven by its friction.
+/// Finds offsets of more than 1.5 times the dry friction: in one direction the friction would drive the joint.
 fn offsets<const N: usize>(
     context: &FitContext<'_, N>,
     motion: &Motion,
     fit: &FitResult,
 ) -> Vec<Finding> {
     let mut findings = Vec::new();
-    for &joint in context.columns.moving() {
+    for &joint in context.columns.identified_joints() {
         let value = |column: Column| context.columns.position(column).map_or(0.0, |i| fit.x[i]);
         let (offset, dry) = (value(Column::Offset(joint)), value(Column::Coulomb(joint)));
         let torque = motion.tau.column(joint);

@@ -1,4 +1,4 @@
-//! Measured velocities against the slopes of the angles: they fix units, order, signs and the clock without any model.
+//! Compares measured velocities with the slopes of the angles, which checks units, order, signs and the clock without a model.
 
 use super::finding::{Finding, Problem};
 use crate::log::Log;
@@ -10,7 +10,7 @@ const TOLERANCE: f64 = 0.04;
 fn ratio(log: &Log, velocity: usize, angle: usize) -> Option<(f64, f64)> {
     let qd = log.qd_rad_per_s.as_ref()?;
     let n = log.t_s.len();
-    // Slopes over some 50 ms: quantised angles.
+    // Slopes are taken over some 50 ms because the angles are quantised.
     let step_s = (log.t_s[n - 1] - log.t_s[0]) / (n - 1) as f64;
     let reach = ((0.03 / step_s).round() as usize).clamp(1, n / 4);
     let (mut vs, mut ss, mut vv) = (0.0, 0.0, 0.0);
@@ -27,11 +27,11 @@ fn ratio(log: &Log, velocity: usize, angle: usize) -> Option<(f64, f64)> {
     (ss > 0.0 && vv > 0.0).then(|| (vs / ss, vs / (ss * vv).sqrt()))
 }
 
-pub(super) fn check(log: &Log, moving: &[usize]) -> Vec<Finding> {
+pub(super) fn check(log: &Log, identified_joints: &[usize]) -> Vec<Finding> {
     if log.qd_rad_per_s.is_none() {
         return Vec::new();
     }
-    let own: Vec<(usize, f64, f64)> = moving
+    let own: Vec<(usize, f64, f64)> = identified_joints
         .iter()
         .filter_map(|&j| ratio(log, j, j).map(|(r, c)| (j, r, c)))
         .collect();
@@ -112,7 +112,7 @@ pub(super) fn check(log: &Log, moving: &[usize]) -> Vec<Finding> {
     findings
 }
 
-/// The same wrong ratio for all joints.
+/// Returns the finding for the same wrong ratio of all joints.
 fn common(ratio: f64) -> Finding {
     let degrees = 180.0 / std::f64::consts::PI;
     if (ratio * degrees - 1.0).abs() < 0.1 {

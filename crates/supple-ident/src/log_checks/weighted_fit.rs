@@ -1,8 +1,8 @@
-//! Quick fit of a model with free link parameters, which the checks of a log compare with and without corrections.
+//! Fast fit of a model with free link parameters, with which the checks of a log compare corrections.
 //!
-//! Weighted least squares over all joints. Unknown are viscous and Coulomb friction and rotor inertia, not negative, torque
-//! offsets, and the parameters of the links, with a wide prior about those of the given arm. It takes milliseconds; the
-//! identified model comes from [`crate::procedure`].
+//! The fit is a weighted least-squares problem over all joints. Its unknowns are viscous and Coulomb friction and rotor inertia
+//! (not negative), torque offsets, and the parameters of the links with a wide prior about the given arm. It takes milliseconds;
+//! the identified model comes from [`crate::procedure`].
 
 use crate::columns::{Column, Columns, FrictionColumns};
 use crate::error::IdentError;
@@ -15,13 +15,13 @@ use supple_core::{Arm, Vector};
 /// Standard deviation of the prior of a link's parameters, relative to the mass of the link or, if greater, to a tenth of
 /// the mean mass.
 const PRIOR: f64 = 0.7;
-/// The same for the comparison of the fitted gravity torques with those of the given arm: a short log determines them badly.
+/// Standard deviation of the prior for the comparison of gravity torques, which a short log determines badly.
 const TIGHT_PRIOR: f64 = 0.1;
 /// Length by which first moments are scaled, as a fraction of the arm's reach.
 const LENGTH: f64 = 0.15;
 /// Number of iterations of the weights.
 const ITERATIONS: usize = 4;
-/// Minimum relative residual of a joint; smaller ones are replaced by it, as they are rounding.
+/// Minimum relative residual of a joint; smaller values are rounding errors and are replaced by it.
 const MIN_RELATIVE_RESIDUAL: f64 = 2e-3;
 
 /// Arm, columns and prior.
@@ -37,7 +37,7 @@ pub(crate) struct FitContext<'a, const N: usize> {
 /// Result of the fit to a motion.
 #[derive(Clone, Debug)]
 pub(crate) struct FitResult {
-    /// RMS residual of each moving joint over the deviation of its torque.
+    /// RMS residual of each identified joint over the deviation of its torque.
     pub relative: Vec<f64>,
     /// Parameters.
     pub x: DVector<f64>,
@@ -55,7 +55,7 @@ impl FitResult {
     }
 }
 
-/// `[A b]' [A b]` of each moving joint, with the deviation of its torque and the number of samples.
+/// `[A b]' [A b]` of each identified joint, with the deviation of its torque and the number of samples.
 #[derive(Clone)]
 pub(crate) struct GramMatrices {
     of_joint: Vec<(DMatrix<f64>, f64)>,
@@ -63,7 +63,7 @@ pub(crate) struct GramMatrices {
 }
 
 impl GramMatrices {
-    /// The matrices of the samples of both motions together.
+    /// Returns the matrices of the samples of both motions together.
     pub fn plus(mut self, other: GramMatrices) -> GramMatrices {
         for ((gram, deviation), (added, other_deviation)) in
             self.of_joint.iter_mut().zip(other.of_joint)
@@ -105,22 +105,22 @@ impl GramMatrices {
 impl<'a, const N: usize> FitContext<'a, N> {
     pub fn new(
         arm: &'a Arm<N>,
-        moving: &[usize],
+        identified_joints: &[usize],
         couplings: &[(usize, usize)],
     ) -> Result<Self, IdentError> {
-        Self::with_prior(arm, moving, couplings, PRIOR)
+        Self::with_prior(arm, identified_joints, couplings, PRIOR)
     }
 
-    /// As [`FitContext::new`], with another relative deviation of the links' parameters.
+    /// Does the same as [`FitContext::new`], with another relative deviation of the links' parameters.
     fn with_prior(
         arm: &'a Arm<N>,
-        moving: &[usize],
+        identified_joints: &[usize],
         couplings: &[(usize, usize)],
         prior_deviation: f64,
     ) -> Result<Self, IdentError> {
         let columns = Columns::new(
             N,
-            moving,
+            identified_joints,
             true,
             FrictionColumns::COULOMB_AND_OFFSET,
             couplings,
@@ -159,7 +159,7 @@ impl<'a, const N: usize> FitContext<'a, N> {
     pub fn with_tight_prior(&self) -> Result<Self, IdentError> {
         Self::with_prior(
             self.arm,
-            self.columns.moving(),
+            self.columns.identified_joints(),
             &self.couplings,
             TIGHT_PRIOR,
         )
@@ -186,7 +186,7 @@ impl<'a, const N: usize> FitContext<'a, N> {
         Ok(self.solve(&self.grams(motion)?))
     }
 
-    /// As [`FitContext::fit`], from Gram matrices.
+    /// Does the same as [`FitContext::fit`], from Gram matrices.
     pub fn solve(&self, grams: &GramMatrices) -> FitResult {
         let width = self.columns.len();
         let joints = grams.of_joint.len();
@@ -272,7 +272,7 @@ fn solve_without(
         normal[(i, i)] = 1.0;
         right[i] = 0.0;
     }
-    // Scaled to a unit diagonal, which Cholesky's method solves to more digits.
+    // Scale to a unit diagonal, for which the Cholesky decomposition is more accurate.
     let scale = normal
         .diagonal()
         .map(|d| 1.0 / d.max(f64::MIN_POSITIVE).sqrt());

@@ -2,7 +2,7 @@
 //! points.
 
 use supple_core::math::Vector;
-use supple_ident::consistent::{Constraints, Solution, pseudo_inertia, solve};
+use supple_ident::constrained_least_squares::{Constraints, Solution, pseudo_inertia, solve};
 use supple_ident::qr_reduction::ReducedSystem;
 use supple_ident::regressor::JointRows;
 use supple_ident::{DMatrix, DVector};

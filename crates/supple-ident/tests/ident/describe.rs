@@ -89,7 +89,7 @@ fn a_collision_threshold_is_three_residuals_two_breakaway_torques_and_a_share_of
             (found_nm, expected_nm) => assert_eq!(*found_nm, expected_nm),
         }
     }
-    // A smaller present threshold stays.
+    // A threshold that is smaller than the computed one is unchanged.
     assert_eq!(thresholds_nm(0.8), [Some(0.8), Some(0.8), None, Some(0.8)]);
 }
 

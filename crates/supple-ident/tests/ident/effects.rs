@@ -1,4 +1,4 @@
-//! Effects beside links and joint friction: their columns against the arm that has them, and the travel of a reversal.
+//! Effects other than links and joint friction: their columns compared with an arm that has them, and the presliding distance.
 
 use supple_core::dynamics::gravity;
 use supple_core::learned::{LearnedTerms, MapWeights};
@@ -68,7 +68,7 @@ fn columns_of_tilt_and_compliance_are_the_change_of_gravity() {
 
 /// Friction of the motors is dissipative, and has columns only where a motor drives several joints.
 #[test]
-fn motors_that_drive_several_joints_have_friction_of_their_own() {
+fn friction_of_motors_that_drive_several_joints_is_identified() {
     let config = wam4();
     let columns = columns(&config);
     let has = |column| columns.position(column).is_some();
@@ -90,7 +90,7 @@ fn motors_that_drive_several_joints_have_friction_of_their_own() {
 /// A motion of an arm with a spring over each joint.
 fn spring_motion(config: &Config<4>, stiffness: f64) -> Motion {
     let (rate_hz, samples) = (100.0, 6000);
-    // Two frequencies: with one alone the torque of a spring is that of an inertia.
+    // The motion has two frequencies, because with one frequency a spring cannot be distinguished from an inertia.
     let angle = |i: usize, j: usize| {
         let t = i as f64 / rate_hz;
         let (f, g) = (0.9 + 0.37 * j as f64, 2.3 + 0.29 * j as f64);
@@ -123,7 +123,7 @@ fn spring_motion(config: &Config<4>, stiffness: f64) -> Motion {
         cutoff_hz: None,
         start_s: 0.0,
         torque_delay_s: 0.0,
-        masks: Vec::new(),
+        excluded_intervals: Vec::new(),
     }
 }
 
@@ -138,9 +138,9 @@ fn springs() -> Options {
     }
 }
 
-/// A fit of an arm with a hose finds its stiffness, and the terms of the controller are its torque.
+/// A fit of an arm with a hose finds the hose's stiffness, and the learned terms of the controller equal its torque.
 #[test]
-fn spring_is_found_and_becomes_a_map() {
+fn an_identified_spring_becomes_a_learned_map() {
     let (config, stiffness) = (wam4(), 0.3);
     let motion = spring_motion(&config, stiffness);
     let options = springs();
@@ -152,7 +152,7 @@ fn spring_is_found_and_becomes_a_map() {
         for x in [0.1, 0.5, 0.8] {
             let q = lower + x * (upper - lower);
             let torque = MapWeights::new(q, lower, upper).of(&learned.map[j].torque_nm);
-            // The map is bounded: only what fits into it.
+            // The map is bounded, so the comparison is limited to torques within the bound.
             let bound = 0.02 * limits.joint_torque_nm[j];
             let expected = (stiffness * q).clamp(-bound, bound);
             assert!(
@@ -163,8 +163,8 @@ fn spring_is_found_and_becomes_a_map() {
     }
 }
 
-/// The description of a fit has all that was identified, and no learned terms of the arm that it replaces: the fit explains the
-/// whole torque.
+/// The description of a fit contains all identified effects, and no learned terms of the replaced description, because the fit
+/// explains the whole torque.
 #[test]
 fn description_of_a_fit_has_its_effects_and_no_older_ones() {
     let nominal = Description::asset("wam4").unwrap();
@@ -212,7 +212,7 @@ fn description_of_a_fit_has_its_effects_and_no_older_ones() {
     assert!(!described.toml().contains("[learned"));
 }
 
-/// Motors that give different shares of what they are commanded: one set of links explains all joints once each has a scale, and
+/// Motors give different fractions of their commands: with a scale for each joint, one set of links explains all joints, and
 /// a controller with the model and the scales commands the torques of another motion.
 #[test]
 fn torque_scales_that_differ_between_motors_are_found() {
@@ -245,7 +245,7 @@ fn torque_scales_that_differ_between_motors_are_found() {
     let (_, without) = residual_nm(false);
     let (found, with) = residual_nm(true);
     assert!(with < 0.003 && with < 0.3 * without, "{with}, {without}");
-    // What all have in common is in the links.
+    // A factor common to all motors is part of the links' parameters.
     let scale = found.torque_scale();
     for j in 1..4 {
         let ratio = (1.0 + scale[j]) / (1.0 + scale[0]);
@@ -257,8 +257,8 @@ fn torque_scales_that_differ_between_motors_are_found() {
     }
 }
 
-/// Friction of gears that grows with the torque of the motor: its coefficient is found, cross-validation tells it from friction
-/// that grows with the load of the joint, and the controller commands what the arm needs.
+/// Friction of gears grows with the torque of the motor: the fit finds its coefficient, cross-validation distinguishes it from
+/// friction that grows with the load of the joint, and the controller commands the required torque.
 #[test]
 fn friction_that_grows_with_the_motors_torque_is_found() {
     let nominal = Description::asset("wam4").unwrap();
@@ -293,14 +293,14 @@ fn friction_that_grows_with_the_motors_torque_is_found() {
         );
         assert_eq!(friction.load_torque, LoadTorque::Motor);
     }
-    // A prediction knows the motion alone: measured torques do not change it.
+    // A prediction depends on the motion alone: measured torques do not change it.
     let mut other = motions[0].clone();
     other.tau.iter_mut().for_each(|nm| *nm = 3.0 - *nm);
     let predicted = found.predict_motion(&motions[0]).unwrap();
     assert!((found.predict_motion(&other).unwrap() - &predicted).amax() < 1e-9);
     let residual = found.validate_motion(&motions[0]).unwrap();
     assert!(residual.total_relative < 0.01, "{residual:?}");
-    // The controller takes the load of gravity alone; this motion is fast.
+    // The controller uses the load of gravity alone, but this motion is fast.
     let without = fit(&config.arm, &motions, &ALL, &base).unwrap();
     let without = without.description(&nominal, None).unwrap();
     let [motion] = &motions;
@@ -312,7 +312,7 @@ fn friction_that_grows_with_the_motors_torque_is_found() {
     assert!(with < 0.8 * without, "{with}, {without}");
 }
 
-/// A fit of some joints leaves compliance and springs of the others as they were.
+/// A fit of some joints does not change compliance and springs of the other joints.
 #[test]
 fn description_of_a_fit_of_some_joints_keeps_the_terms_of_the_others() {
     let nominal = Description::asset("wam4").unwrap();
@@ -359,9 +359,9 @@ fn learning_friction_keeps_the_springs() {
     assert_eq!(after.config::<4>().unwrap().learned, config.learned);
 }
 
-/// Friction that turns round over a travel: the travel is found; friction by the sign of the velocity has none.
+/// The fit finds the distance over which friction reverses; friction that follows the sign of the velocity has none.
 #[test]
-fn travel_of_a_reversal_is_found_where_there_is_one() {
+fn the_presliding_distance_is_found_if_the_arm_has_one() {
     let config = wam4();
     let (rate_hz, samples) = (200.0, 12_000);
     for travel_rad in [0.0, 1e-3] {
@@ -386,7 +386,7 @@ fn travel_of_a_reversal_is_found_where_there_is_one() {
             cutoff_hz: None,
             start_s: 0.0,
             torque_delay_s: 0.0,
-            masks: Vec::new(),
+            excluded_intervals: Vec::new(),
         };
         let mut direction = [0.0; 4];
         for i in 0..samples {

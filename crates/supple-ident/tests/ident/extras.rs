@@ -5,7 +5,7 @@ use supple_core::dynamics::{gravity, rnea, tip_pose};
 use supple_core::math::{Matrix3, Vector3};
 use supple_core::ripple::Harmonic;
 use supple_core::{Body, Config, Friction, Matrix, RippleTable, Vector};
-use supple_ident::design::{
+use supple_ident::excitation_design::{
     Criterion, DesignOptions, Workspace, constant_speed_series, design, slow_series,
 };
 use supple_ident::learn::with_payload;
@@ -43,7 +43,7 @@ fn a_design_improves_and_stays_within_every_limit() {
             candidates: 120,
             criterion,
             workspace: Some(workspace),
-            ..DesignOptions::of(&ALL)
+            ..DesignOptions::new(&ALL)
         };
         let mut calls = 0;
         let found = design(&config, &home, &request, &mut |_, _| calls += 1).unwrap();
@@ -84,7 +84,7 @@ fn only_the_given_joints_move() {
     let (config, home) = (wam4(), description.home::<4>().unwrap());
     let request = DesignOptions {
         candidates: 40,
-        ..DesignOptions::of(&[1, 3])
+        ..DesignOptions::new(&[1, 3])
     };
     let found = design(&config, &home, &request, &mut |_, _| {}).unwrap();
     let slow = slow_series(&config, &home, &[1, 3], 0.1, 30.0).unwrap();
@@ -140,7 +140,7 @@ fn a_workspace_that_no_motion_stays_in_is_rejected() {
             lower_m: [5.0; 3],
             upper_m: [6.0; 3],
         }),
-        ..DesignOptions::of(&ALL)
+        ..DesignOptions::new(&ALL)
     };
     let home = description.home::<4>().unwrap();
     let error = design(&wam4(), &home, &request, &mut |_, _| {}).unwrap_err();
@@ -230,7 +230,7 @@ fn motion_with_ripple(
         cutoff_hz: None,
         start_s: 0.0,
         torque_delay_s: 0.0,
-        masks: Vec::new(),
+        excluded_intervals: Vec::new(),
     }
 }
 

@@ -141,7 +141,7 @@ fn a_regular_log_keeps_its_samples() {
 #[test]
 fn filter_transients_are_discarded() {
     let preparation = Preparation {
-        keep_every: 2,
+        decimation_factor: 2,
         ..Preparation::default()
     };
     let samples = 601;

@@ -1,7 +1,7 @@
 //! The paper's estimator recovers exactly the ten determined combinations of the published set.
 
 use supple_core::Vector;
-use supple_ident::paper::{estimate, with_psi};
+use supple_ident::paper_estimator::{estimate, with_psi};
 use supple_ident::{DMatrix, Motion};
 use supple_model::paper::Parameters;
 use supple_random::Random;
@@ -41,7 +41,7 @@ fn motion(truth: &Parameters, samples: usize) -> Motion {
         cutoff_hz: None,
         start_s: 0.0,
         torque_delay_s: 0.0,
-        masks: Vec::new(),
+        excluded_intervals: Vec::new(),
     }
 }
 
@@ -69,7 +69,7 @@ fn the_null_space_couples_the_inertias_and_the_solution_has_minimum_norm() {
         assert!(!text.contains("V") && !text.contains("m2r2"), "{text}");
     }
     let norm = |psi: &[f64; 12]| psi.iter().map(|p| p * p).sum::<f64>();
-    // sin^2 + cos^2 = 1: taken from Iz1, given to Ix and Iy' of one link.
+    // Because sin^2 + cos^2 = 1, an amount can move from Iz1 to Ix and Iy' of one link.
     for (ix, iy) in [(1, 3), (6, 7)] {
         for step in [0.01, -0.01] {
             let mut moved = found.psi;

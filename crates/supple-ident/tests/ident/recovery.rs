@@ -104,7 +104,7 @@ proptest! {
         let mut data = exact.clone();
         let mut noise = Random::new(seed);
         data.tau.iter_mut().for_each(|t| *t += amplitude_nm * noise.signed());
-        // Some of these arms hardly move, so no sample may be excluded.
+        // Some of these arms move very little, so no sample may be excluded.
         let options = Options { slow_rad_per_s: 0.0, ..Options::default() };
         let fit = fit(&truth, &[data], &joints, &options).unwrap();
         prop_assert!(fit.arm().is_ok());
@@ -270,7 +270,7 @@ fn load_dependent_friction_is_identified() {
     for j in 0..3 {
         let value = fit.x[names.iter().position(|n| *n == format!("L{j}")).unwrap()];
         assert!((value - 0.05).abs() < 1e-4, "{value}");
-        // The controller is given the friction at the mean load, and how it grows with the load.
+        // The controller uses the friction at the mean load, and its growth with the load.
         let (found, unloaded) = (fit.friction()[j], friction::<3>()[j]);
         let more_nm = found.coulomb_nm - unloaded.coulomb_nm;
         let mean_nm = 0.05 * fit.load_nm[j];

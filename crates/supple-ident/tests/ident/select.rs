@@ -27,7 +27,7 @@ fn base() -> Options {
 }
 
 #[test]
-fn the_true_friction_model_is_chosen() {
+fn the_true_friction_model_is_selected() {
     let stribeck = Friction {
         breakaway_nm: 3.0,
         stribeck_rad_per_s: 0.5,
@@ -49,7 +49,7 @@ fn the_true_friction_model_is_chosen() {
         let candidates = friction_candidates(&base());
         let table = compare(&model, &[noisy(friction)], &JOINTS, &candidates, 4).unwrap();
         assert_eq!(
-            table.lines[table.chosen].candidate.name, expected,
+            table.candidates[table.chosen].candidate.name, expected,
             "\n{table}"
         );
     }
@@ -119,7 +119,7 @@ fn rejects_a_single_part_and_an_empty_list() {
     assert!(compare(&model, &data, &JOINTS, &[], 4).is_err());
 }
 
-/// The flag ends a comparison between its fits and a fit between its steps, whatever else would come of them.
+/// The flag ends a comparison between two fits, and a fit between two steps.
 #[test]
 fn a_cancelled_identification_has_no_result() {
     let model = random_arm::<3>(61);

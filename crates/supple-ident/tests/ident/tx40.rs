@@ -66,7 +66,7 @@ fn the_second_half_is_predicted_from_the_first() {
         preparation: Preparation {
             rate_hz: Some(RATE_HZ),
             cutoff_hz: Some(40.0),
-            keep_every: 10,
+            decimation_factor: 10,
             ..Preparation::default()
         },
         ..Procedure::default()

@@ -1,4 +1,4 @@
-//! Where the motion excites them, the terms converge to the truth; they never leave their bounds.
+//! Terms that the motion excites converge to the true values; no term leaves its bounds.
 
 use crate::support::configs::{four, seven, three};
 use crate::support::rig::bent;
@@ -32,7 +32,7 @@ fn truth<const N: usize>() -> impl Strategy<Value = Truth<N>> {
         })
 }
 
-/// After 40 s of motion the controller's prediction of the torque misses less than a fifth of what it missed before,
+/// After 40 s of motion the error of the controller's predicted torque is less than a fifth of its initial value,
 /// RMS along a motion of the same joints, and no learned number is beyond its bound.
 fn learns<const N: usize>(config: Config<N>, truth: Truth<N>) -> Result<(), TestCaseError> {
     let config = model(config);
@@ -48,7 +48,7 @@ fn learns<const N: usize>(config: Config<N>, truth: Truth<N>) -> Result<(), Test
         let output = world.cycle(None, Vector3::zeros());
         prop_assert_eq!(output.fault, None);
         prop_assert!(bounds.check(&output.learned).is_ok());
-        // The stiff loops carry what the feed-forward lacks: before the first terms, and at the end.
+        // The stiff loops supply the torque that the feed-forward lacks: before the first terms, and at the end.
         match k {
             1000..4000 => feedback(&output, 0),
             36_000..39_000 => feedback(&output, 1),
@@ -65,10 +65,10 @@ fn learns<const N: usize>(config: Config<N>, truth: Truth<N>) -> Result<(), Test
     Ok(())
 }
 
-/// Steps of the encoders that a fast estimator turns into noise of the velocity teach nothing: with an exact model all terms stay
+/// With a fast estimator, encoder steps cause velocity noise. With an exact model this noise is not learned: all terms stay
 /// near zero.
 #[test]
-fn noise_of_the_velocity_teaches_nothing() {
+fn velocity_noise_does_not_change_the_estimate() {
     let mut config = model(four());
     config.estimator_rad_per_s = 400.0;
     let mut world = World::new(config, Truth::none());
@@ -104,10 +104,10 @@ fn terms_of_seven_joints_converge() {
     check(2, seven());
 }
 
-/// The learned payload and tilt are those of the arm, not something else that happens to fit: their gravity torque at
-/// poses that the motion did not visit is right within a tenth of the whole, and friction within a tenth of the change.
+/// The learned payload and tilt are those of the arm, not an accidental fit: their gravity torque in
+/// poses outside of the motion has an error below a tenth of the torque, and friction below a tenth of the change.
 #[test]
-fn single_deviations_are_found_as_what_they_are() {
+fn a_single_deviation_is_attributed_to_its_own_parameter() {
     let config = model(four());
     let learned = |truth: Truth<4>| {
         let mut world = World::new(config, truth);
@@ -131,7 +131,7 @@ fn single_deviations_are_found_as_what_they_are() {
         ..Truth::none()
     });
     for i in 0..4 {
-        // The map takes a small part of it.
+        // The map explains a small part of the torque.
         let coulomb = friction.coulomb_nm[i];
         assert!((coulomb - 0.08).abs() < 0.02, "joint {i}: {coulomb} N m");
         let viscous = friction.viscous_nm_s_per_rad[i];
@@ -139,9 +139,9 @@ fn single_deviations_are_found_as_what_they_are() {
     }
 }
 
-/// Friction of 1.8 times the model's is beyond the bound of half: the learned change stops there.
+/// Friction of 1.8 times the model's is beyond the bound of half: the learned change stops at the bound.
 #[test]
-fn deviations_beyond_the_bounds_stop_at_them() {
+fn estimates_of_deviations_beyond_the_bounds_stop_at_the_bounds() {
     let config = model(three());
     let truth = Truth {
         coulomb: Vector::repeat(0.8),
@@ -172,7 +172,7 @@ fn deviations_beyond_the_bounds_stop_at_them() {
     );
 }
 
-/// Joints that do not move keep the model's values, whatever acts on them.
+/// Joints that do not move keep the model's values, independent of the forces on them.
 #[test]
 fn joints_at_rest_keep_the_models_values() {
     let config = model(four());
@@ -201,9 +201,9 @@ fn joints_at_rest_keep_the_models_values() {
     }
 }
 
-/// The regressor of the learner against inverse dynamics of a changed arm: a wrong sign fails.
+/// Compares the learner's regressor with inverse dynamics of a changed arm: the test fails with a wrong sign.
 #[test]
-fn prediction_error_has_the_sign_of_what_is_missing() {
+fn the_prediction_error_has_the_sign_of_the_missing_torque() {
     let config = model(three());
     let truth = Truth {
         payload_kg: 0.1,
@@ -256,9 +256,9 @@ fn slow() -> Fourier<4> {
     series
 }
 
-/// Slow joints teach their dry friction where the travel of a reversal is known, and nothing where it is not.
+/// The dry friction of slow joints is learned if the presliding distance is known, and not otherwise.
 #[test]
-fn slow_joints_teach_where_the_travel_of_a_reversal_is_known() {
+fn slow_joints_are_used_if_the_presliding_distance_is_known() {
     let truth = Truth {
         coulomb: Vector::repeat(0.2),
         ..Truth::none()

@@ -1,4 +1,4 @@
-//! Nothing is learned from what is not the arm.
+//! Forces from outside of the arm are not learned.
 
 use crate::support::configs::four;
 use crate::support::size;
@@ -6,7 +6,7 @@ use crate::world::{Truth, World, exciting, model};
 use supple_core::controller::{LearningSwitch, Mode, Request};
 use supple_core::learned::LearnedParameters;
 use supple_core::math::Vector3;
-use supple_learning::Frozen;
+use supple_learning::FreezeReason;
 
 /// Greatest change over the bound of each number.
 fn change(world: &World<4>, from: &LearnedParameters<4>, to: &LearnedParameters<4>) -> f64 {
@@ -31,10 +31,10 @@ fn trained() -> World<4> {
     world
 }
 
-/// A person leans on the arm for 10 s in its motion: no learned number changes by more than 2 % of its bound, nor by
-/// more than 5 % in the 10 s after, than without the person.
+/// A person leans on the moving arm for 10 s: compared with a run without the person, no learned number differs by more than 2 %
+/// of its bound, and by more than 5 % in the following 10 s.
 #[test]
-fn person_leaning_on_the_arm_changes_nothing() {
+fn a_person_who_leans_on_the_arm_does_not_change_the_estimate() {
     for force_n in [
         Vector3::new(0.0, 0.0, -4.0),
         Vector3::new(0.0, 3.0, 0.0),
@@ -46,7 +46,7 @@ fn person_leaning_on_the_arm_changes_nothing() {
         alone.run(0.001, Vector3::zeros());
         let pushed = world.run(10.0, force_n).learned;
         let at_rest = alone.run(10.0, Vector3::zeros()).learned;
-        // What was on its way when the push began still comes into force.
+        // Estimates that were pending when the push began are still applied.
         let drift = change(&world, &before, &at_rest);
         let pushed = change(&world, &before, &pushed);
         assert!(
@@ -65,13 +65,13 @@ fn person_leaning_on_the_arm_changes_nothing() {
 }
 
 #[test]
-fn nothing_is_learned_while_off_and_in_modes_in_which_people_push() {
+fn nothing_is_learned_while_learning_is_off_and_in_modes_for_hand_guiding() {
     let truth = Truth {
         payload_kg: 0.03,
         ..Truth::none()
     };
     let mut world = World::new(model(four()), truth);
-    assert_eq!(world.learner.report().frozen, Some(Frozen::Mode));
+    assert_eq!(world.learner.report().frozen, Some(FreezeReason::Mode));
     for is_compliant in [false, true] {
         let target_rad = world.plant.q;
         world.request(match is_compliant {
@@ -81,14 +81,14 @@ fn nothing_is_learned_while_off_and_in_modes_in_which_people_push() {
                 duration_s: 0.5,
             },
         });
-        // A hand moves the arm about.
+        // A hand moves the arm.
         for k in 0..4000 {
             let t = f64::from(k) * 1e-3;
             let force = Vector3::new(0.0, (2.0 * t).sin(), (1.5 * t).cos());
             let output = world.cycle(None, force);
             assert_eq!(output.fault, None);
         }
-        assert_eq!(world.learner.report().frozen, Some(Frozen::Mode));
+        assert_eq!(world.learner.report().frozen, Some(FreezeReason::Mode));
     }
     assert!(world.requests.is_empty());
 
@@ -97,14 +97,14 @@ fn nothing_is_learned_while_off_and_in_modes_in_which_people_push() {
     world.request(Request::Excite(exciting::<4>(10.0)));
     let output = world.run(9.0, Vector3::zeros());
     assert_eq!(output.mode, Mode::Excite);
-    assert_eq!(world.learner.report().frozen, Some(Frozen::Off));
+    assert_eq!(world.learner.report().frozen, Some(FreezeReason::Off));
     assert!(world.requests.is_empty());
     assert_eq!(size(&output.torques.learned), 0.0);
 }
 
-/// A change of the arm that stays, as a tool that was changed in motion, is learned after a while.
+/// A lasting change of the arm, such as a tool change during motion, is learned after some time.
 #[test]
-fn lasting_change_is_learned_in_the_end() {
+fn a_lasting_change_is_learned_eventually() {
     let mut world = World::new(model(four()), Truth::none());
     world.request(Request::Excite(exciting::<4>(120.0)));
     world.run(25.0, Vector3::zeros());
@@ -115,15 +115,15 @@ fn lasting_change_is_learned_in_the_end() {
     assert!((late.payload_kg - 0.15).abs() < 0.05, "{late:?}");
 }
 
-/// A constant force that stays, as of a weight without inertia, is not learned soon either; in the end payload, offset and tilt
-/// together carry most of it, the payload alone two thirds.
+/// A lasting constant force, such as a weight without inertia, is also not learned soon; finally payload, offset and tilt
+/// together compensate most of it, the payload alone two thirds.
 #[test]
-fn lasting_force_is_compensated_in_the_end() {
+fn a_lasting_force_is_compensated_eventually() {
     let mut world = World::new(model(four()), Truth::none());
     world.request(Request::Excite(exciting::<4>(120.0)));
     world.run(25.0, Vector3::zeros());
     let force_n = Vector3::new(0.0, 0.0, -0.15 * 9.81);
-    // The stiff loops carry what the feed-forward lacks.
+    // The stiff loops supply the torque that the feed-forward lacks.
     let mut feedback_nm = |seconds: u32| {
         let (mut sum, mut learned) = (0.0, LearnedParameters::zero());
         for _ in 0..seconds * 1000 {
@@ -145,7 +145,7 @@ fn lasting_force_is_compensated_in_the_end() {
     );
 }
 
-/// Resetting discards the samples too.
+/// A reset also discards the samples.
 #[test]
 fn reset_forgets() {
     let mut world = trained();

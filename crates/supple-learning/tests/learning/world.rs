@@ -20,7 +20,7 @@ pub struct Truth<const N: usize> {
     pub offset_nm: Vector<N>,
     /// Point mass at the tip \[kg\].
     pub payload_kg: f64,
-    /// Turn of gravity \[rad\].
+    /// Rotation of gravity \[rad\].
     pub tilt_rad: Vector3<f64>,
 }
 
@@ -57,7 +57,7 @@ impl<const N: usize> Truth<N> {
     }
 }
 
-/// Size of a joint's friction and loops over that of a joint of shoulder and elbow: the wrist is small.
+/// Friction and gains of a joint relative to those of a joint of shoulder and elbow; the wrist is small.
 pub fn size_of_joint(joint: usize) -> f64 {
     match joint {
         0..4 => 1.0,
@@ -98,7 +98,7 @@ pub fn exciting<const N: usize>(duration_s: f64) -> Fourier<N> {
             cosine[i] = size * phase.cos();
         }
     }
-    // It begins at the pose where the arm is.
+    // The motion begins in the present pose of the arm.
     let start = series.at(0.0).position_rad - series.centre_rad;
     series.centre_rad -= start;
     series.duration_s = duration_s;
@@ -123,7 +123,7 @@ pub struct World<const N: usize> {
 }
 
 impl<const N: usize> World<N> {
-    /// In gravity hold with learning on.
+    /// Creates a world in gravity hold with learning on.
     pub fn new(config: Config<N>, truth: Truth<N>) -> Self {
         let mut world = World {
             rig: Rig::new(config, bent()),

@@ -1,5 +1,5 @@
-//! A run to log: a controller moves the four-joint arm, integrated without friction, through every mode, with
-//! requests of every outcome, a lost encoder reply and a fault.
+//! A sample run for the log tests: a controller moves the four-joint arm, simulated without friction, through several modes, with
+//! accepted and refused requests, a lost encoder reply and a fault.
 
 #![allow(dead_code, reason = "each test uses its part")]
 
@@ -10,13 +10,13 @@ use supple_core::dynamics::aba;
 use supple_core::math::Vector3;
 use supple_core::trajectory::{Line, Probe};
 use supple_core::{Config, Controller, Friction, Input, Output, State, Trajectory, Vector, step};
-use supple_log::{CycleTiming, Extras, LogError, PlantTruth, RunInfo, Writer, Written};
+use supple_log::{CycleTiming, Extras, LogError, LogSummary, PlantTruth, RunInfo, Writer};
 use supple_model::Description;
 
 pub const N: usize = 4;
 pub const CYCLE_NS: u64 = 1_000_000;
 /// First cycle of two lost encoder replies, which cause a fault.
-pub const FAULT_AT: u64 = 1_500;
+pub const FAULT_CYCLE: u64 = 1_500;
 /// Number of steps of a complete run.
 pub const STEPS: u64 = 1_800;
 
@@ -24,7 +24,7 @@ pub fn description() -> Description {
     Description::asset("wam4").expect("a built-in arm")
 }
 
-/// Configuration of the arm without friction, since the plant has none.
+/// Configuration of the arm without friction, because the simulated arm has none.
 pub fn config() -> Config<N> {
     let config = description().config::<N>().expect("four joints");
     Config {
@@ -42,7 +42,7 @@ pub fn run_info() -> RunInfo {
     }
 }
 
-/// One step as it is logged.
+/// Data of one step for the log.
 #[derive(Clone)]
 pub struct Cycle {
     pub time_ns: u64,
@@ -51,8 +51,8 @@ pub struct Cycle {
     pub extras: Extras<N>,
 }
 
-/// Runs `steps` steps and passes each to the caller.
-pub fn run(steps: u64, mut watch: impl FnMut(&Cycle)) {
+/// Runs `steps` steps and calls `on_cycle` with each.
+pub fn run(steps: u64, mut on_cycle: impl FnMut(&Cycle)) {
     let config = config();
     let controller = Controller::new(config).expect("a valid configuration");
     let mut state = State::new(&controller);
@@ -62,7 +62,7 @@ pub fn run(steps: u64, mut watch: impl FnMut(&Cycle)) {
     for k in 0..steps {
         let input = Input {
             cycle: k,
-            position_rad: core::array::from_fn(|i| answers(k, i).then_some(q[i])),
+            position_rad: core::array::from_fn(|i| encoder_replies(k, i).then_some(q[i])),
             tip_force_n: (k >= 600).then(|| Vector3::new(0.1 * k as f64, -0.3, 1.0 / 3.0)),
             drives_active: true,
             request: request(k, &home, tip),
@@ -83,7 +83,7 @@ pub fn run(steps: u64, mut watch: impl FnMut(&Cycle)) {
             latency_ns: 100 + k,
             step_ns: 2_000,
         };
-        watch(&Cycle {
+        on_cycle(&Cycle {
             time_ns: k * CYCLE_NS,
             input,
             output,
@@ -99,8 +99,9 @@ pub fn run(steps: u64, mut watch: impl FnMut(&Cycle)) {
 }
 
 /// Returns whether encoder `joint` replies in cycle `k`.
-fn answers(k: u64, joint: usize) -> bool {
-    let lost = (k == 1_300 && joint == 1) || ((FAULT_AT..FAULT_AT + 2).contains(&k) && joint == 2);
+fn encoder_replies(k: u64, joint: usize) -> bool {
+    let lost =
+        (k == 1_300 && joint == 1) || ((FAULT_CYCLE..FAULT_CYCLE + 2).contains(&k) && joint == 2);
     !lost
 }
 
@@ -138,7 +139,7 @@ fn request(k: u64, home: &Vector<N>, tip: Vector3<f64>) -> Option<Request<N>> {
 }
 
 /// Logs a run of `steps` steps.
-pub fn write(path: &Path, steps: u64) -> Result<Written, LogError> {
+pub fn write(path: &Path, steps: u64) -> Result<LogSummary, LogError> {
     let mut writer = Writer::create(path, &description(), &config(), &run_info())?;
     let mut failed = None;
     run(steps, |cycle| {

@@ -1,5 +1,5 @@
-//! The numbers of modes, faults, requests and refusals never change: they are those of the first message definition,
-//! which `data/ControllerState.msg` holds.
+//! The numbers of modes, faults, requests and refusals never change: they equal those of the first message definition,
+//! `data/ControllerState.msg`.
 
 use supple_core::codes::{self, FaultCode, MODES};
 use supple_core::controller::{Fault, Mode, Refusal};

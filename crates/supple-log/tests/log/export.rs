@@ -34,9 +34,9 @@ fn cells(line: &str) -> Vec<String> {
     cells
 }
 
-/// A row by the names of its columns.
-fn named<'a>(heading: &'a [String], row: &'a [String]) -> BTreeMap<&'a str, &'a str> {
-    let names = heading.iter().map(String::as_str);
+/// Returns the cells of a row by the names of their columns.
+fn named<'a>(header_row: &'a [String], row: &'a [String]) -> BTreeMap<&'a str, &'a str> {
+    let names = header_row.iter().map(String::as_str);
     names.zip(row.iter().map(String::as_str)).collect()
 }
 
@@ -52,17 +52,17 @@ fn run() -> (tempfile::TempDir, std::path::PathBuf) {
 fn every_step_is_exported_as_a_row() {
     let (_folder, path) = run();
     let lines = table(&path, "/controller_state", 1);
-    let (heading, rows) = lines.split_first().expect("a heading");
+    let (header_row, rows) = lines.split_first().expect("a header row");
     assert_eq!(rows.len() as u64, STEPS);
     let reader = Reader::open(&path).expect("opened");
     for (row, logged) in rows.iter().zip(reader.records::<N>().expect("four joints")) {
         let logged = logged.expect("whole");
-        let row = named(heading, row);
-        agrees(&row, logged.time_ns, &logged.value);
+        let row = named(header_row, row);
+        assert_row_equals_record(&row, logged.time_ns, &logged.value);
     }
 }
 
-fn agrees(row: &BTreeMap<&str, &str>, time_ns: u64, r: &CycleRecord<N>) {
+fn assert_row_equals_record(row: &BTreeMap<&str, &str>, time_ns: u64, r: &CycleRecord<N>) {
     let number = |name: &str| -> f64 { row[name].parse().expect("a number") };
     let bits = |name: &str, value: f64| {
         assert_eq!(
@@ -238,7 +238,7 @@ fn the_overview_shows_the_content_of_the_log() {
         (0, "gravity_hold"),
         (100, "move"),
         (600, "track"),
-        (common::FAULT_AT + 1, "fault"),
+        (common::FAULT_CYCLE + 1, "fault"),
         (1_510, "idle"),
         (1_530, "gravity_hold"),
     ];

@@ -76,7 +76,7 @@ fn assert_record_rejected(definition: &str, bytes: &[u8], expected: &[&str]) {
 }
 
 #[test]
-fn a_malicious_definition_of_a_record() {
+fn a_malicious_record_definition_is_rejected() {
     let data = &[0; RECORD_BYTES];
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.mcap");
@@ -119,7 +119,7 @@ const SEPARATOR: &str =
     "================================================================================";
 
 #[test]
-fn a_recursive_message_type() {
+fn a_recursive_message_type_is_rejected() {
     assert_rejected("A a\n", &[0; 8], &["p/A", "is recursive"]);
     assert_rejected("A[] a\n", &[255; 4096], &["p/A", "is recursive"]);
     let indirect = format!("B b\n{SEPARATOR}\nMSG: p/B\nint8 x\nA[] a\n");
@@ -127,7 +127,7 @@ fn a_recursive_message_type() {
 }
 
 #[test]
-fn messages_that_double_with_every_level() {
+fn messages_that_double_with_every_level_are_rejected() {
     let mut definition = "M0 a\nM0 b\n".to_owned();
     for i in 0..30 {
         definition += &format!("{SEPARATOR}\nMSG: p/M{i}\nM{0} a\nM{0} b\n", i + 1);
@@ -137,7 +137,7 @@ fn messages_that_double_with_every_level() {
 }
 
 #[test]
-fn more_elements_than_there_are_bytes() {
+fn more_elements_than_bytes_are_rejected() {
     let empty_elements = format!("N[9223372036854775808] n\n{SEPARATOR}\nMSG: p/N\nint8[0] x\n");
     assert_rejected(&empty_elements, &[0; 8], &["at n", "at most 100000 fields"]);
     assert_rejected(
@@ -151,7 +151,7 @@ fn more_elements_than_there_are_bytes() {
 
 /// An MCAP record whose declared length exceeds the memory, in a sparse file of that length.
 #[test]
-fn an_mcap_record_as_long_as_the_file() {
+fn an_mcap_record_as_long_as_the_file_is_rejected() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.mcap");
     let length: u64 = 1 << 40;

@@ -30,7 +30,7 @@ fn a_log_has_its_final_name_only_when_it_is_complete() {
 
 /// No byte of an empty file is valid, and there is nothing to recover.
 #[test]
-fn an_empty_file_is_called_empty() {
+fn an_empty_file_is_reported_as_empty() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("empty.mcap");
     fs::write(&path, "").expect("written");

@@ -31,8 +31,8 @@ fn original() -> Original {
     }
 }
 
-/// Number of messages in a file, by the strict reader of the mcap library, which requires the end of the file.
-fn strictly_counted(bytes: &[u8]) -> u64 {
+/// Counts the messages of a file with the strict reader of the mcap library, which requires the end of the file.
+fn message_count(bytes: &[u8]) -> u64 {
     let summary = mcap::Summary::read(bytes).expect("valid").expect("indexed");
     let counted = summary.stats.expect("statistics").message_count;
     let messages = mcap::MessageStream::new(bytes).expect("valid");
@@ -76,7 +76,7 @@ fn truncation_anywhere_keeps_all_complete_chunks() {
         kept.push(recovery.messages);
 
         assert_eq!(
-            strictly_counted(&fs::read(&to).expect("read")),
+            message_count(&fs::read(&to).expect("read")),
             recovery.messages
         );
         let reader = Reader::open(&to).expect("opened");
@@ -91,7 +91,7 @@ fn truncation_anywhere_keeps_all_complete_chunks() {
         assert_eq!(info.recovered, Some((cut as u64, recovery.kept_bytes)));
         assert_eq!((info.incomplete, info.missing_steps), (None, 0));
     }
-    // 1,100 steps of 1 ms in chunks of 250 ms: five chunks, kept one after the other.
+    // 1,100 steps of 1 ms in chunks of 250 ms: five chunks, which become complete one after the other.
     assert_eq!(kept.len(), 5, "{kept:?}");
     assert!(nothing > 0);
     assert!(
@@ -144,7 +144,7 @@ fn a_complete_file_is_copied_byte_for_byte() {
 fn recovery_stops_at_a_damaged_chunk() {
     let original = original();
     let (from, to) = names(original.folder.path());
-    let whole = strictly_counted(&original.bytes);
+    let whole = message_count(&original.bytes);
     let summary = mcap::Summary::read(&original.bytes).expect("valid");
     let chunks = summary.expect("indexed").chunk_indexes;
     let mut bytes = original.bytes.clone();
@@ -164,7 +164,7 @@ fn recovery_stops_at_a_damaged_chunk() {
 /// Random damage of lengths, checksums and record types, half of it near the beginning, where they are dense: memory
 /// stays bounded, and only steps that were written are returned.
 #[test]
-fn damage_anywhere_invents_nothing() {
+fn reading_a_damaged_file_returns_only_written_steps() {
     let original = original();
     let (from, to) = names(original.folder.path());
     let length = original.bytes.len();
@@ -222,7 +222,7 @@ fn a_part_file_can_be_recovered_to_the_name_of_its_log() {
     fs::write(&part, half).expect("cut");
     recover(&part, &to).expect("recovered");
     assert_eq!(fs::read(&part).expect("untouched"), half);
-    strictly_counted(&fs::read(&to).expect("read"));
+    message_count(&fs::read(&to).expect("read"));
 }
 
 #[test]

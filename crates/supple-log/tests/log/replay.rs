@@ -113,7 +113,7 @@ fn rewrite(path: &std::path::Path, mut change: impl FnMut(u64, &mut common::Cycl
     writer.finish().expect("finished");
 }
 
-/// Words of faults and refusals change between versions, and fields are added: neither is a difference.
+/// Neither changed messages of faults and refusals nor added fields count as differences between versions.
 #[test]
 fn a_log_of_the_first_format_replays() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/version_1.mcap");

@@ -14,7 +14,7 @@ fn every_step_is_read_back_bit_exactly() {
 
     let reader = Reader::open(&path).expect("opened");
     let mut records = reader.records::<N>().expect("four joints");
-    let mut truths = reader.truths::<N>().expect("four joints");
+    let mut plant_truths = reader.plant_truths::<N>().expect("four joints");
     let mut timings = reader.timings().expect("timed");
     let mut k = 0;
     common::run(STEPS, |cycle| {
@@ -26,7 +26,7 @@ fn every_step_is_read_back_bit_exactly() {
         assert_eq!(read.value, record);
         assert_eq!(read.value.input().expect("a known request"), cycle.input);
         assert_eq!(read.value.mode(), Some(cycle.output.mode));
-        let truth = truths.next().expect("truth").expect("complete");
+        let truth = plant_truths.next().expect("truth").expect("complete");
         assert_eq!(Some(truth.value), cycle.extras.truth);
         let timing = timings.next().expect("timing").expect("complete");
         assert_eq!(Some(timing.value), cycle.extras.timing);
@@ -34,7 +34,7 @@ fn every_step_is_read_back_bit_exactly() {
         k += 1;
     });
     assert_eq!(k, STEPS);
-    assert!(records.next().is_none() && truths.next().is_none() && timings.next().is_none());
+    assert!(records.next().is_none() && plant_truths.next().is_none() && timings.next().is_none());
 }
 
 /// Compares field by field: a round trip alone would not detect swapped fields.
@@ -52,8 +52,8 @@ fn a_record_equals_the_output_of_the_controller() {
             (&r.velocity_rad_per_s, &o.velocity_rad_per_s),
             (&r.external_torque_nm, &o.external_torque_nm),
         ];
-        for (logged, said) in joints {
-            assert_eq!(logged.as_slice(), said.as_slice());
+        for (logged, expected) in joints {
+            assert_eq!(logged.as_slice(), expected.as_slice());
         }
         assert_eq!(r.torques, o.torques);
         let vectors = [
@@ -63,8 +63,8 @@ fn a_record_equals_the_output_of_the_controller() {
             (&r.damping_n_s_per_m, &o.gains.damping_n_s_per_m),
             (&r.external_force_n, &o.external_force_n),
         ];
-        for (logged, said) in vectors {
-            assert_eq!(logged.as_slice(), said.as_slice());
+        for (logged, expected) in vectors {
+            assert_eq!(logged.as_slice(), expected.as_slice());
         }
         let reference = o.reference.map(|reference| {
             let vectors = [
@@ -99,7 +99,7 @@ fn a_record_equals_the_output_of_the_controller() {
                 o.min_singular_value_m
             ]
         );
-        let text = |said: Option<String>| said.unwrap_or_default();
+        let text = |expected: Option<String>| expected.unwrap_or_default();
         assert_eq!(
             r.fault_text.as_str(),
             text(o.fault.map(|fault| fault.to_string()))
@@ -140,15 +140,15 @@ fn a_log_contains_its_metadata() {
     common::write(&path, 10).expect("written");
     let reader = Reader::open(&path).expect("opened");
 
-    let about = reader.about();
-    assert_eq!(about.arm, "wam4");
-    assert_eq!(about.experiment, "sample");
-    assert_eq!(about.seed, Some(7));
-    assert_eq!(about.start_ns, 0);
-    assert_eq!(about.notes, common::run_info().notes);
-    assert!(about.software.starts_with("supple-log "));
+    let metadata = reader.metadata();
+    assert_eq!(metadata.arm, "wam4");
+    assert_eq!(metadata.experiment, "sample");
+    assert_eq!(metadata.seed, Some(7));
+    assert_eq!(metadata.start_ns, 0);
+    assert_eq!(metadata.notes, common::run_info().notes);
+    assert!(metadata.software.starts_with("supple-log "));
     let description = reader.description().expect("the arm");
-    assert_eq!(about.joints, description.joint_names());
+    assert_eq!(metadata.joints, description.joint_names());
     assert_eq!(description.urdf(), common::description().urdf());
     assert_eq!(description.toml(), common::description().toml());
     let names: Vec<_> = reader.attachments().keys().collect();
@@ -212,7 +212,7 @@ fn a_log_of_the_first_format_is_read() {
     assert_eq!((last.mode(), last.fault), (Some(Mode::Move), 0));
     assert!(last.drives_active && last.fault_text.as_str().is_empty());
     assert!(last.torques.gravity.amax() > 1.0, "{last:?}");
-    // Called least_singular_value_m in that format.
+    // The field has the name least_singular_value_m in that format.
     let values = records.iter().map(|record| record.min_singular_value_m);
     assert!(values.fold(f64::INFINITY, f64::min) > 0.01, "{last:?}");
 }

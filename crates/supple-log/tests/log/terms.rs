@@ -1,4 +1,4 @@
-//! On an arm that has every term of the torque, each consumer of a record gets terms whose sum is the commanded torque.
+//! On an arm with every torque term, the terms that each consumer of a record receives sum to the commanded torque.
 
 use crate::common::{self, N};
 use std::num::NonZeroU64;
@@ -71,8 +71,8 @@ fn request(k: u64, home: &Vector<N>, tip: Vector3<f64>) -> Option<Request<N>> {
     }
 }
 
-/// Runs the arm without friction of its own, and passes each step to the caller.
-fn run(mut watch: impl FnMut(u64, &Input<N>, &Output<N>)) {
+/// Runs the simulated arm without friction, and calls `on_cycle` with each step.
+fn run(mut on_cycle: impl FnMut(u64, &Input<N>, &Output<N>)) {
     let config = config();
     let controller = Controller::new(config).expect("a valid configuration");
     let mut state = State::new(&controller);
@@ -89,13 +89,13 @@ fn run(mut watch: impl FnMut(u64, &Input<N>, &Output<N>)) {
         let output = step(&controller, &mut state, &input);
         assert_eq!((output.fault, output.refusal), (None, None), "step {k}");
         tip = output.tip_position_m;
-        watch(k, &input, &output);
+        on_cycle(k, &input, &output);
         qd += aba(&config.arm, &q, &qd, &output.torque_nm) * config.period_s;
         q += qd * config.period_s;
     }
 }
 
-/// The steps whose torque no limit cut, and a log of all of them.
+/// Writes a log of all steps, and returns the steps whose torque no limit reduced.
 fn logged(path: &Path) -> Vec<CycleRecord<N>> {
     let description = common::description();
     let mut writer =
@@ -114,13 +114,13 @@ fn logged(path: &Path) -> Vec<CycleRecord<N>> {
     records
 }
 
-fn add_up(sum_nm: Vector<N>, record: &CycleRecord<N>) {
+fn assert_sum_is_torque(sum_nm: Vector<N>, record: &CycleRecord<N>) {
     let off = (sum_nm - record.torque_nm).amax();
     assert!(off < ROUNDING_NM, "step {}: off by {off} N m", record.step);
 }
 
 #[test]
-fn every_consumer_gets_terms_that_add_up() {
+fn terms_in_every_consumer_sum_to_the_torque() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("run.mcap");
     let records = logged(&path);
@@ -138,11 +138,11 @@ fn every_consumer_gets_terms_that_add_up() {
     }
 
     for record in &records {
-        add_up(record.torques.total(), record);
+        assert_sum_is_torque(record.torques.total(), record);
         // The words of telemetry, and the table of the last cycles before a fault.
         let mut words = vec![0; CycleRecord::<N>::words(N)];
         record.pack(&mut words);
-        add_up(CycleRecord::<N>::unpack(&words, N).torques.total(), record);
+        assert_sum_is_torque(CycleRecord::<N>::unpack(&words, N).torques.total(), record);
         let mut sum_nm = Vector::<N>::zeros();
         for_each_column(CycleRecord::<N>::FIELDS, &words, N, |column, cell| {
             if let (Some(_), Cell::Number(nm)) = (column.term, cell) {
@@ -151,14 +151,14 @@ fn every_consumer_gets_terms_that_add_up() {
                 sum_nm[joint.parse::<usize>().expect("a number")] += nm;
             }
         });
-        add_up(sum_nm, record);
+        assert_sum_is_torque(sum_nm, record);
     }
 
     let reader = Reader::open(&path).expect("opened");
     for logged in reader.records::<N>().expect("four joints") {
         let logged = logged.expect("whole").value;
         if records.iter().any(|record| record.step == logged.step) {
-            add_up(logged.torques.total(), &logged);
+            assert_sum_is_torque(logged.torques.total(), &logged);
         }
     }
 
@@ -186,6 +186,6 @@ fn every_consumer_gets_terms_that_add_up() {
                 .map(|(_, cell)| cell.parse::<f64>().expect("a number"))
                 .sum()
         };
-        add_up(Vector::from(joints.map(sum_of)), record);
+        assert_sum_is_torque(Vector::from(joints.map(sum_of)), record);
     }
 }

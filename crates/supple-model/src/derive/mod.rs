@@ -59,12 +59,12 @@ impl Description {
         with_dof!(self.dof(), N => complete::<N>(self))?
     }
 
-    /// Whether the TOML still has settings that [`Description::completed`] derived and marked so.
+    /// Returns whether the TOML still has settings that [`Description::completed`] derived and marked so.
     pub fn has_derived_settings(&self) -> bool {
         self.toml().contains(write::MARK)
     }
 
-    /// Whether gains, inertias and home pose are given for every joint.
+    /// Returns whether gains, inertias and home pose are given for every joint.
     fn is_complete(&self, writer: &Writer) -> bool {
         let given = |name: &String| JOINT_KEYS.iter().all(|key| writer.has_joint(name, key));
         self.settings().home_rad.is_some() && self.joint_names().iter().all(given)

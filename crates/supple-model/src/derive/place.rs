@@ -316,7 +316,7 @@ impl<const N: usize> Check<'_, N> {
         Some(weight_n)
     }
 
-    /// Whether a pose on a path, at this velocity of the tip, keeps the margins.
+    /// Returns whether a pose on a path, at this velocity of the tip, keeps the margins.
     fn is_good(&self, q: &Vector<N>, velocity: &Vector3<f64>) -> bool {
         let limits = &self.config.limits;
         let margin = limits.soft_zone_rad + STOP_MARGIN_RAD;

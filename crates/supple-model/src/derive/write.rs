@@ -61,12 +61,12 @@ impl Writer {
         })
     }
 
-    /// Whether the original text has entries of joints.
+    /// Returns whether the original text has entries of joints.
     pub fn has_given_joints(&self) -> bool {
         self.has_given_joints
     }
 
-    /// Whether the text gives a key of a joint.
+    /// Returns whether the text gives a key of a joint.
     pub fn has_joint(&self, joint: &str, key: &str) -> bool {
         let tables = self
             .document

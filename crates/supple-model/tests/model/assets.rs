@@ -24,7 +24,7 @@ fn every_asset_gives_a_valid_controller() {
     }
 }
 
-/// Without tool and rotors, as the reference was computed.
+/// The arm without tool and rotors, like the reference.
 fn bare<const N: usize>(description: &Description) -> Parts<N> {
     let mut parts = description.parts::<N>().unwrap();
     parts.tool = None;
@@ -74,7 +74,7 @@ fn arms_match_the_reference() {
     agrees_with_the_reference::<7>("wam7");
 }
 
-/// The same for the arms whose reference is 40 states of all quantities; see `supple-core/tests/data`.
+/// The same comparison for the arms whose reference is 40 states of all quantities; see `supple-core/tests/data`.
 fn agrees_in_all_states<const N: usize>(name: &str, states: &str) {
     let reference: Value = serde_json::from_str(states).unwrap();
     let samples = &reference["samples"];
@@ -100,9 +100,9 @@ fn openarm_and_yam_match_their_reference() {
     agrees_in_all_states::<6>("yam", yam);
 }
 
-/// The chosen limits lie inside the makers', and each joint stays inside its motor's peak torque.
+/// The chosen limits are below those of the manufacturers, and each joint limit is below the peak torque of the motor.
 #[test]
-fn limits_of_openarm_and_yam_are_below_the_makers() {
+fn limits_of_openarm_and_yam_are_below_the_manufacturers_limits() {
     for name in ["openarm", "yam"] {
         let description = asset(name);
         let robot = urdf_rs::read_from_string(description.urdf()).unwrap();
@@ -115,13 +115,13 @@ fn limits_of_openarm_and_yam_are_below_the_makers() {
                 assert!(limits.joint_torque_nm[i] < 0.8 * limit.effort, "{joint}");
                 assert!(limits.joint_speed_rad_per_s[i] < 0.4 * limit.velocity, "{joint}");
                 assert!(limits.position_upper_rad[i] <= limit.upper - 0.029, "{joint}");
-                // Where the arm rests on a stop, its angle there is the edge of the soft zone.
+                // If the arm rests on a stop, the angle is the edge of the soft zone.
                 let rests = stow[i] - limits.position_lower_rad[i] < limits.soft_zone_rad + 1e-6
                     && stow[i] <= limits.position_lower_rad[i] + limits.soft_zone_rad + 1e-6;
                 let margin = if rests { 0.0 } else { 0.029 };
                 assert!(limits.position_lower_rad[i] >= limit.lower + margin, "{joint}");
             }
-            // Gravity anywhere in the range stays below the limits.
+            // Gravity stays below the limits in the whole range.
             for k in 0..2000u32 {
                 let q = Vector::<N>::from_fn(|i, _| {
                     let fraction = (f64::from(k) * (0.37 + 0.11 * i as f64)).fract();
@@ -158,9 +158,9 @@ fn openarm_and_yam_stay_in_their_stow_pose_without_torque() {
     }
 }
 
-/// The bus section agrees with the motors section: steps of torque and position of the frames.
+/// The resolution of torque and position in the bus frames agrees with the motors section.
 #[test]
-fn the_steps_of_the_bus_are_those_of_the_motors() {
+fn the_resolution_on_the_bus_equals_the_resolution_of_the_motors() {
     for name in ["openarm", "yam"] {
         let description = asset(name);
         let bus = description.bus().expect("a bus");

@@ -1,4 +1,4 @@
-//! Settings derived from the arm: safe in every pose, the same again, and none where the TOML gives them.
+//! Settings derived from the arm: stable in every pose, reproducible, and not applied if the TOML gives values.
 
 use crate::common::{TOML, URDF, with};
 use supple_core::controller::Controller;
@@ -48,7 +48,7 @@ fn derived_gains_are_stable_in_every_pose() {
             rate * delay_s < std::f64::consts::FRAC_PI_4,
             "pose {pose}: {rate} 1/s"
         );
-        // No mode is less than critically damped by more than rounding and the poses in between.
+        // Every mode is critically damped, to within rounding and the poses between the evaluated ones.
         let frequency = fastest_rate(&config, &stiffness, pose).sqrt();
         assert!(
             2.0 * frequency < 1.3 * DAMPING_TIMES_DELAY / delay_s,
@@ -71,7 +71,7 @@ fn derived_gains_are_stable_in_every_pose() {
     );
 }
 
-/// As the derivation documents it.
+/// The documented derivation.
 const DAMPING_TIMES_DELAY: f64 = 0.4;
 
 #[test]
@@ -91,9 +91,9 @@ fn a_completed_arm_is_complete_and_reaches_its_paths() {
     assert!((start - home).norm() < 2e-3, "{start} {home}");
 }
 
-/// What the TOML gives stays, to the byte.
+/// The settings in the TOML are unchanged, byte for byte.
 #[test]
-fn given_settings_and_built_in_arms_stay() {
+fn given_settings_and_built_in_arms_are_unchanged() {
     for name in assets() {
         let arm = Description::asset(name).unwrap();
         let completed = arm.completed().unwrap();
@@ -131,7 +131,7 @@ fn given_settings_and_built_in_arms_stay() {
 
 /// A prismatic lift, eight more joints, a gripper with a mimic, a point mass and an inertia that no body has.
 #[test]
-fn a_urdf_alone_makes_an_arm() {
+fn an_arm_can_be_read_from_a_urdf_alone() {
     let folder = tempfile::tempdir().unwrap();
     let inertial = |mass: &str, i: &str| {
         format!(
@@ -247,9 +247,10 @@ fn gripper_urdf(folder: &std::path::Path, last: &str) -> UrdfName {
     UrdfName::parse(&path.display().to_string()).unwrap()
 }
 
-/// No URDF says whether its last joint belongs to a gripper: the warning names both tips, also once all is derived.
+/// A URDF does not state whether its last joint belongs to a gripper, so the warning names both tips, also after all settings are
+/// derived.
 #[test]
-fn the_tip_that_nobody_named_is_a_warning_with_the_link_before_it() {
+fn a_tip_chosen_without_a_request_is_a_warning_that_names_its_parent_link() {
     let folder = tempfile::tempdir().unwrap();
     let name = gripper_urdf(folder.path(), "revolute");
     let arm = Description::from_urdf(&name).unwrap();
@@ -270,9 +271,9 @@ fn the_tip_that_nobody_named_is_a_warning_with_the_link_before_it() {
     assert!(Description::from_urdf(&named).unwrap().strict().is_ok());
 }
 
-/// A side joint of a URDF is a warning of the arm with all settings, too.
+/// A joint beside the chain of a URDF causes a warning, also for the arm with all settings.
 #[test]
-fn a_completed_arm_has_the_warnings_of_what_was_given() {
+fn a_completed_arm_has_the_warnings_of_the_given_files() {
     let folder = tempfile::tempdir().unwrap();
     let mut name = gripper_urdf(folder.path(), "prismatic");
     name.tip = Some("flange".to_owned());

@@ -253,7 +253,7 @@ fn a_held_joint_has_its_role_if_three_others_remain() {
     );
 }
 
-/// Three keys are enough.
+/// A TOML with three keys is valid.
 #[test]
 fn everything_else_has_a_default() {
     let urdf = with(
@@ -368,15 +368,15 @@ fn extensions_and_decoration_are_accepted() {
     );
 }
 
-/// With the delay of the loop, this damping shakes the finger, whose inertia is small.
+/// With the delay of the loop, this damping makes the finger unstable, because its inertia is small.
 #[test]
-fn damping_that_the_delay_forbids_is_refused_by_joint() {
+fn damping_that_is_unstable_with_the_delay_is_refused_with_its_joint() {
     let toml = with(&free(), "tip_frame = \"tip\"", "tip_frame = \"finger\"");
     let toml = with(&toml, "home_rad = [0.0, 0.5, 0.2]\n", "");
     let toml = with(&toml, "finger_joint = 0.3\n", "");
     let (start, end) = (toml.find("[motors]").unwrap(), toml.find("[tool]").unwrap());
     let refusal = |entry: &str| {
-        // Otherwise a rotor inertia is estimated, with which the finger is heavy.
+        // Without this entry a rotor inertia is estimated, which increases the finger's inertia.
         let rotor = "armature_kg_m2 = 0.0";
         let finger = format!("[[joints]]\nname = \"finger_joint\"\n{rotor}\n{entry}\n");
         let toml = format!("{}{finger}{}", &toml[..start], &toml[end..]);
@@ -402,9 +402,9 @@ fn damping_that_the_delay_forbids_is_refused_by_joint() {
     }
 }
 
-/// At a quarter of the rate the delay is longer: the roll joint of the WAM is held with less.
+/// At a quarter of the rate the delay is longer, so the roll joint of the WAM is held with smaller gains.
 #[test]
-fn a_lower_rate_has_the_damping_that_its_delay_allows() {
+fn a_lower_control_rate_reduces_the_damping_to_the_limit_of_its_delay() {
     let wam = Description::asset("wam4").unwrap();
     let held = |description: &Description| match description.config::<4>().unwrap().roles[2] {
         Role::Held {

@@ -129,7 +129,7 @@ proptest! {
     }
 }
 
-/// The text with one piece replaced by a typical fragment of such files, or removed.
+/// The text with one part replaced by a typical fragment of such files, or removed.
 fn mutated(text: &'static str) -> impl Strategy<Value = String> {
     let words = prop::sample::select(vec![
         "", "0", "-1", "1e308", "nan", "inf", "\"", "<", ">", "/", "[", "]", "=", "<link/>",

@@ -17,13 +17,13 @@ fn read(text: &str) -> Result<Workspace, String> {
 }
 
 #[test]
-fn without_it_the_tip_may_go_anywhere() {
+fn without_a_workspace_the_tip_is_not_limited() {
     let workspace = read("").unwrap();
     assert!(workspace.is_unbounded());
 }
 
 #[test]
-fn every_entry_has_its_place() {
+fn every_workspace_entry_reaches_the_configuration() {
     let workspace = read(
         "[workspace]
         margin_m = 0.03
@@ -79,7 +79,7 @@ fn every_entry_has_its_place() {
         .map(|zone| (zone.tip_speed_m_per_s, zone.tip_force_n))
         .collect();
     assert_eq!(limits, [(0.2, f64::MAX), (f64::MAX, 7.0)]);
-    // A point is inside the box, beyond the wall of the floor, or in the box that is kept out.
+    // The points are inside the box, beyond the wall of the floor, or in the forbidden box.
     let border = |x, y, z| {
         let found = workspace.violated_border(&Vector3::new(x, y, z));
         found.map(|(index, _)| index)
@@ -92,7 +92,7 @@ fn every_entry_has_its_place() {
 }
 
 #[test]
-fn what_is_left_out_has_the_documented_default() {
+fn missing_workspace_entries_have_the_documented_default() {
     let workspace = read("[[workspace.wall]]\nnormal = [0.0, 1.0, 0.0]\noffset_m = 0.4").unwrap();
     let defaults = (
         workspace.margin_m,

@@ -10,11 +10,11 @@ use core::array;
 use std::collections::VecDeque;
 use supple_core::{Matrix, Vector};
 
-/// Wraps a plant and modifies its encoder readings and torque commands. Without injections it passes everything
-/// through bit-exactly.
+/// Runs a plant with injected faults: modifies its encoder readings and torque commands. Without injections all values pass
+/// unchanged, bit for bit.
 #[derive(Clone, Debug)]
 pub struct Injector<const N: usize> {
-    running: Vec<Running<N>>,
+    scheduled: Vec<ScheduledInjection<N>>,
     /// Number of plant cycles so far.
     cycle: u64,
     cycle_s: f64,
@@ -25,12 +25,12 @@ pub struct Injector<const N: usize> {
 }
 
 #[derive(Clone, Debug)]
-struct Running<const N: usize> {
+struct ScheduledInjection<const N: usize> {
     injection: Injection,
-    /// Cycle at which it begins, once the trigger has occurred.
+    /// Cycle at which the injection begins; `None` until its trigger has occurred.
     due: Option<u64>,
     begun: bool,
-    /// Angles reported when it began.
+    /// Angles reported when the injection began.
     start_rad: Vector<N>,
     /// Delayed angles or torques.
     pending: VecDeque<Vector<N>>,
@@ -46,7 +46,7 @@ impl<const N: usize> Injector<N> {
         let config = plant.config();
         let joint_from_motor = config.actuators.joint_from_motor;
         Injector {
-            running: Vec::new(),
+            scheduled: Vec::new(),
             cycle: 0,
             cycle_s: config.cycle_s,
             // The plant has checked that its transmission is regular.
@@ -58,11 +58,11 @@ impl<const N: usize> Injector<N> {
         }
     }
 
-    /// The plant must not have moved yet: injections with [`Trigger::AtStart`] begin here. `period_s` is the control
-    /// cycle, in which delays are counted; the cycle of the plant may be shorter.
+    /// Creates an injector for a plant that has not moved yet; injections with [`Trigger::AtStart`] begin here. Delays count in
+    /// control cycles of `period_s`; the cycle of the plant may be shorter.
     ///
     /// # Errors
-    /// [`InjectionError::Index`]: a joint or motor that the arm does not have; [`InjectionError::Value`]: a value out
+    /// [`InjectionError::Index`] for a joint or motor that the arm does not have; [`InjectionError::Value`] for a value out
     /// of its range.
     pub fn new(
         injections: &[Injection],
@@ -91,9 +91,9 @@ impl<const N: usize> Injector<N> {
             }
             _ => 0,
         };
-        let running = injections.iter().map(|injection| {
+        let scheduled = injections.iter().map(|injection| {
             let delay = delay_of(injection);
-            Running {
+            ScheduledInjection {
                 injection: *injection,
                 due: (injection.trigger == Trigger::AtStart).then_some(0),
                 begun: false,
@@ -103,9 +103,9 @@ impl<const N: usize> Injector<N> {
                 replies: [0; N],
             }
         });
-        injector.running = running.collect();
+        injector.scheduled = scheduled.collect();
         injector.begin_due(plant);
-        injector.read(plant);
+        injector.read_encoders(plant);
         Ok(injector)
     }
 
@@ -118,16 +118,20 @@ impl<const N: usize> Injector<N> {
         torque_nm: &Vector<N>,
         shorted: [bool; N],
     ) {
-        self.trigger(view);
+        self.schedule_triggered(view);
         self.begin_due(plant);
-        plant.see_controller(view);
+        plant.set_controller_view(view);
         let (mut torque_nm, mut shorted) = (*torque_nm, shorted);
         if self.drives_idle() {
             torque_nm = Vector::zeros();
             shorted = [true; N];
         }
-        for running in self.running.iter_mut().filter(|running| running.begun) {
-            match running.injection.kind {
+        for scheduled in self
+            .scheduled
+            .iter_mut()
+            .filter(|scheduled| scheduled.begun)
+        {
+            match scheduled.injection.kind {
                 InjectionKind::MotorDead { motor } => {
                     let mut at_motors = self.joint_from_motor.transpose() * torque_nm;
                     at_motors[motor] = 0.0;
@@ -135,14 +139,14 @@ impl<const N: usize> Injector<N> {
                     shorted[motor] = false;
                 }
                 InjectionKind::TorqueSign { joint } => torque_nm[joint] = -torque_nm[joint],
-                InjectionKind::TorqueLate { .. } => torque_nm = running.delay_line(torque_nm),
+                InjectionKind::TorqueLate { .. } => torque_nm = scheduled.delay_line(torque_nm),
                 _ => {}
             }
         }
         plant.short_motors(shorted);
         plant.cycle(&torque_nm);
         self.cycle += 1;
-        self.read(plant);
+        self.read_encoders(plant);
     }
 
     /// Encoder readings of the joint angles at the end of the last cycle \[rad\].
@@ -161,13 +165,17 @@ impl<const N: usize> Injector<N> {
     /// Counts one reply of a joint (on a bus: of a motor) and returns whether to drop it.
     pub fn drops_reply(&mut self, joint: usize) -> bool {
         let mut lost = false;
-        for running in self.running.iter_mut().filter(|running| running.begun) {
-            if let InjectionKind::ReplyLost { joint: of, every } = running.injection.kind
+        for scheduled in self
+            .scheduled
+            .iter_mut()
+            .filter(|scheduled| scheduled.begun)
+        {
+            if let InjectionKind::ReplyLost { joint: of, every } = scheduled.injection.kind
                 && of.is_none_or(|of| of == joint)
             {
-                running.replies[joint] += 1;
-                if running.replies[joint] == every {
-                    running.replies[joint] = 0;
+                scheduled.replies[joint] += 1;
+                if scheduled.replies[joint] == every {
+                    scheduled.replies[joint] = 0;
                     lost = true;
                 }
             }
@@ -177,55 +185,58 @@ impl<const N: usize> Injector<N> {
 
     /// Returns whether an injection forces the drives to idle.
     pub fn drives_idle(&self) -> bool {
-        self.running.iter().any(|running| {
-            let InjectionKind::DrivesIdle { for_s } = running.injection.kind else {
+        self.scheduled.iter().any(|scheduled| {
+            let InjectionKind::DrivesIdle { for_s } = scheduled.injection.kind else {
                 return false;
             };
-            let since = running.due.unwrap_or(self.cycle);
+            let since = scheduled.due.unwrap_or(self.cycle);
             let over = for_s.is_some_and(|for_s| {
-                self.cycle.saturating_sub(since) >= cycles_of(for_s, self.cycle_s)
+                self.cycle.saturating_sub(since) >= whole_cycles(for_s, self.cycle_s)
             });
-            running.begun && !over
+            scheduled.begun && !over
         })
     }
 
     /// Returns whether this motor produces no torque and does not brake.
     pub fn is_dead(&self, motor: usize) -> bool {
-        let mut running = self.running.iter().filter(|running| running.begun);
-        running.any(|running| running.injection.kind == InjectionKind::MotorDead { motor })
+        let mut scheduled = self.scheduled.iter().filter(|scheduled| scheduled.begun);
+        scheduled.any(|scheduled| scheduled.injection.kind == InjectionKind::MotorDead { motor })
     }
 
-    /// Whether there are no injections, neither begun nor scheduled.
+    /// Returns whether the injector has no injections, neither begun nor scheduled.
     pub fn is_empty(&self) -> bool {
-        self.running.is_empty()
+        self.scheduled.is_empty()
     }
 
     /// Number of injections that have begun.
     pub fn begun(&self) -> usize {
-        self.running.iter().filter(|running| running.begun).count()
+        self.scheduled
+            .iter()
+            .filter(|scheduled| scheduled.begun)
+            .count()
     }
 
-    fn trigger(&mut self, view: ControllerView) {
-        for running in self.running.iter_mut().filter(|r| r.due.is_none()) {
-            let after_s = match running.injection.trigger {
+    fn schedule_triggered(&mut self, view: ControllerView) {
+        for scheduled in self.scheduled.iter_mut().filter(|r| r.due.is_none()) {
+            let after_s = match scheduled.injection.trigger {
                 Trigger::AtStart => Some(0.0),
                 Trigger::Active { at_s } => view.active.then_some(at_s),
                 Trigger::Mode { mode, after_s } => {
                     (view.active && view.mode == Some(mode)).then_some(after_s)
                 }
             };
-            running.due = after_s.map(|after_s| self.cycle + cycles_of(after_s, self.cycle_s));
+            scheduled.due = after_s.map(|after_s| self.cycle + whole_cycles(after_s, self.cycle_s));
         }
     }
 
     fn begin_due(&mut self, plant: &mut Plant<N>) {
-        for running in &mut self.running {
-            if running.begun || running.due.is_none_or(|due| due > self.cycle) {
+        for scheduled in &mut self.scheduled {
+            if scheduled.begun || scheduled.due.is_none_or(|due| due > self.cycle) {
                 continue;
             }
-            running.begun = true;
-            running.start_rad = self.position_rad;
-            let done: Result<(), PlantError> = match running.injection.kind {
+            scheduled.begun = true;
+            scheduled.start_rad = self.position_rad;
+            let done: Result<(), PlantError> = match scheduled.injection.kind {
                 InjectionKind::GravityReversed => {
                     plant.reverse_gravity();
                     Ok(())
@@ -246,20 +257,24 @@ impl<const N: usize> Injector<N> {
         }
     }
 
-    fn read(&mut self, plant: &Plant<N>) {
+    fn read_encoders(&mut self, plant: &Plant<N>) {
         let mut position_rad = plant.measurement().position_rad;
-        for running in self.running.iter_mut().filter(|running| running.begun) {
-            if let InjectionKind::MotorEncoderStuck { motor } = running.injection.kind {
-                let turned_rad = self.motor_from_joint * (position_rad - running.start_rad);
+        for scheduled in self
+            .scheduled
+            .iter_mut()
+            .filter(|scheduled| scheduled.begun)
+        {
+            if let InjectionKind::MotorEncoderStuck { motor } = scheduled.injection.kind {
+                let turned_rad = self.motor_from_joint * (position_rad - scheduled.start_rad);
                 position_rad -= self.joint_from_motor.column(motor) * turned_rad[motor];
             }
-            running.corrupt_positions(&mut position_rad);
+            scheduled.corrupt_positions(&mut position_rad);
         }
         self.position_rad = position_rad;
     }
 }
 
-impl<const N: usize> Running<N> {
+impl<const N: usize> ScheduledInjection<N> {
     /// Delay line: stores a value and returns the one stored `delay` cycles ago, or the first one.
     fn delay_line(&mut self, value: Vector<N>) -> Vector<N> {
         self.pending.push_back(value);
@@ -296,6 +311,6 @@ impl<const N: usize> Running<N> {
     }
 }
 
-fn cycles_of(time_s: f64, cycle_s: f64) -> u64 {
+fn whole_cycles(time_s: f64, cycle_s: f64) -> u64 {
     (time_s / cycle_s).round() as u64
 }

@@ -1,4 +1,4 @@
-//! An injected fault: what it is, and when it begins.
+//! An injected fault: its kind and its trigger.
 
 use supple_core::controller::Mode;
 
@@ -134,7 +134,7 @@ impl InjectionKind {
         }
     }
 
-    /// The joint or motor that it affects, with its key in text form.
+    /// Returns the joint or motor that the fault affects, with its key in text form.
     pub(super) fn index(&self) -> Option<(&'static str, usize)> {
         match *self {
             InjectionKind::EncoderStuck { joint }

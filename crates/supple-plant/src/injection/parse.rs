@@ -58,7 +58,7 @@ const MAX_CYCLES: u32 = 1000;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum InjectionError {
     /// Unknown kind.
-    #[error("injection `{found}`: no such kind; give one of {}", known())]
+    #[error("injection `{found}`: no such kind; give one of {}", kind_names())]
     Kind {
         /// Given kind.
         found: String,
@@ -107,7 +107,7 @@ pub enum InjectionError {
         /// Number of joints of the arm.
         joints: usize,
     },
-    /// An arm on a bus does not support it.
+    /// An arm on a bus does not support the injection.
     #[error("injection {kind} on an emulated bus: {remedy}")]
     NotOnBus {
         /// Kind.
@@ -117,7 +117,7 @@ pub enum InjectionError {
     },
 }
 
-fn known() -> String {
+fn kind_names() -> String {
     KINDS.map(|(name, _)| name).join(", ")
 }
 
@@ -129,17 +129,17 @@ fn keys_of(kind: &str) -> String {
 }
 
 /// The keys of one injection with their values.
-struct Keys<'a> {
+struct InjectionKeys<'a> {
     kind: &'static str,
     given: Vec<(&'a str, &'a str)>,
 }
 
-impl<'a> Keys<'a> {
+impl<'a> InjectionKeys<'a> {
     fn read(
         kind: &'static str,
         allowed: &[&str],
         text: &'a str,
-    ) -> Result<Keys<'a>, InjectionError> {
+    ) -> Result<InjectionKeys<'a>, InjectionError> {
         let mut given: Vec<(&str, &str)> = Vec::new();
         for part in text.split(',').filter(|part| !part.is_empty()) {
             let wrong = |problem| {
@@ -157,7 +157,7 @@ impl<'a> Keys<'a> {
             }
             given.push((key, value));
         }
-        Ok(Keys { kind, given })
+        Ok(InjectionKeys { kind, given })
     }
 
     fn text(&self, key: &str) -> Option<&'a str> {
@@ -185,7 +185,7 @@ impl<'a> Keys<'a> {
         }
     }
 
-    fn needed<T: FromStr>(
+    fn required<T: FromStr>(
         &self,
         key: &'static str,
         must: &'static str,
@@ -204,13 +204,13 @@ impl<'a> Keys<'a> {
     }
 
     fn count(&self, key: &'static str) -> Result<u32, InjectionError> {
-        self.needed(key, "a whole number from 1 to 1000", |k| {
+        self.required(key, "a whole number from 1 to 1000", |k| {
             (1..=MAX_CYCLES).contains(k)
         })
     }
 
     fn change(&self, key: &'static str) -> Result<f64, InjectionError> {
-        self.needed(
+        self.required(
             key,
             "a number from -1000 to 1000 other than 0",
             |x: &f64| x.abs() <= 1000.0 && *x != 0.0,
@@ -264,13 +264,13 @@ impl FromStr for Injection {
         let (kind, allowed) = *kind.ok_or_else(|| InjectionError::Kind {
             found: name.to_owned(),
         })?;
-        let keys = Keys::read(kind, allowed, keys)?;
+        let keys = InjectionKeys::read(kind, allowed, keys)?;
         let kind = match kind {
             "encoder-stuck" => InjectionKind::EncoderStuck {
                 joint: keys.joint()?,
             },
             "motor-encoder-stuck" => InjectionKind::MotorEncoderStuck {
-                motor: keys.needed("motor", INDEX, |_| true)?,
+                motor: keys.required("motor", INDEX, |_| true)?,
             },
             "encoder-late" => InjectionKind::EncoderLate {
                 joint: keys.joint()?,
@@ -291,21 +291,21 @@ impl FromStr for Injection {
                 every: keys.count("every")?,
             },
             "motor-dead" => InjectionKind::MotorDead {
-                motor: keys.needed("motor", INDEX, |_| true)?,
+                motor: keys.required("motor", INDEX, |_| true)?,
             },
             "torque-sign" => InjectionKind::TorqueSign {
-                joint: keys.needed("joint", INDEX, |_| true)?,
+                joint: keys.required("joint", INDEX, |_| true)?,
             },
             "torque-late" => InjectionKind::TorqueLate {
                 cycles: keys.count("cycles")?,
             },
             "gravity-reversed" => InjectionKind::GravityReversed,
             "bump" => InjectionKind::Bump {
-                joint: keys.needed("joint", INDEX, |_| true)?,
+                joint: keys.required("joint", INDEX, |_| true)?,
                 speed_rad_per_s: keys.change("speed-rad-per-s")?,
             },
             "payload" => InjectionKind::Payload {
-                mass_kg: keys.needed("mass-kg", "a number from 0.001 to 1000", |x: &f64| {
+                mass_kg: keys.required("mass-kg", "a number from 0.001 to 1000", |x: &f64| {
                     (0.001..=1000.0).contains(x)
                 })?,
             },
@@ -320,7 +320,7 @@ impl FromStr for Injection {
     }
 }
 
-/// The text form, which [`Injection::from_str`] parses to the same injection.
+/// Writes the text form, which [`Injection::from_str`] parses to the same injection.
 impl fmt::Display for Injection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut keys: Vec<String> = Vec::new();
@@ -367,7 +367,7 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_survives_the_round_trip() {
+    fn every_kind_is_written_as_the_text_that_it_was_parsed_from() {
         for text in [
             "encoder-stuck",
             "encoder-stuck:joint=1,when=track,after-s=0.5",

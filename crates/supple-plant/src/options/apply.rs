@@ -21,9 +21,9 @@ const FRICTION_PERIODS: f64 = 4.0;
 /// Time constant of the warm-up if it is not given \[s\].
 const WARM_UP_S: f64 = 600.0;
 
-/// What an effect draws from the seed: each has a stream of its own.
+/// Random stream of each effect: effects draw independently from the same seed.
 #[derive(Clone, Copy)]
-enum Draw {
+enum RandomStream {
     Cogging = 16,
     TorqueRipple,
     Direction,
@@ -37,8 +37,8 @@ enum Draw {
 }
 
 impl PlantOptions {
-    /// The plant `config` with these options; they draw their signs and phases from the options' seed, or else from that
-    /// of the plant. Without options the plant is unchanged.
+    /// Returns the plant `config` with these options. Signs and phases are drawn from the seed of the options, or else from the
+    /// seed of the plant. Without options the plant is unchanged.
     ///
     /// # Errors
     /// [`PlantError`] if an option does not fit the arm.
@@ -49,7 +49,7 @@ impl PlantOptions {
         let mut config = config;
         config.hand.clone_from(&self.hand);
         let seed = self.seed.map_or(config.seed, u64::from);
-        let noise = |draw: Draw| Noise::new(seed, draw as u64);
+        let noise = |draw: RandomStream| Noise::new(seed, draw as u64);
         let signs = |draw, size: f64| {
             let mut noise = noise(draw);
             Vector::from_fn(|_, _| if noise.uniform() < 0.5 { -size } else { size })
@@ -67,7 +67,7 @@ impl PlantOptions {
                 .or_else(|_| entry(false, "tool_extra_kg", kg, must).map(|()| config.arm))?;
         }
         if let Some(tilt_rad) = self.base_tilt_rad {
-            let direction_rad = TAU * noise(Draw::Tilt).uniform();
+            let direction_rad = TAU * noise(RandomStream::Tilt).uniform();
             config.arm = tilted(&config.arm, tilt_rad, direction_rad).or_else(|_| {
                 entry(false, "base_tilt_rad", tilt_rad, "finite").map(|()| config.arm)
             })?;
@@ -77,10 +77,10 @@ impl PlantOptions {
         if let Some(fraction) = self.friction_angle_fraction {
             variation.angle_fraction = fraction;
             variation.periods_per_revolution = FRICTION_PERIODS;
-            variation.phase_rad = phases(Draw::Angle);
+            variation.phase_rad = phases(RandomStream::Angle);
         }
         if let Some(fraction) = self.friction_direction_fraction {
-            variation.direction_fraction = signs(Draw::Direction, fraction);
+            variation.direction_fraction = signs(RandomStream::Direction, fraction);
         }
         variation.viscous_load_fraction = self.friction_load_fraction.unwrap_or(0.0);
         variation.gear_fraction = self.gear_friction_fraction.unwrap_or(0.0);
@@ -102,7 +102,7 @@ impl PlantOptions {
         let bounded = |size: f64| bound_nm.map(|bound| size.min(bound));
         config.hose.stiffness_nm_per_rad = bounded(self.hose_stiffness_nm_per_rad.unwrap_or(0.0));
         if let Some(preload_nm) = self.hose_preload_nm {
-            let sign = signs(Draw::HosePreload, 1.0);
+            let sign = signs(RandomStream::HosePreload, 1.0);
             config.hose.preload_nm = bounded(preload_nm).component_mul(&sign);
         }
         config.cycle_jitter = self.cycle_jitter_fraction.unwrap_or(0.0);
@@ -110,11 +110,15 @@ impl PlantOptions {
         let actuators = &mut config.actuators;
         if let Some(size_nm) = self.ripple_nm {
             let sizes_nm = bounded(size_nm);
-            let cogging = cogging(&actuators.joint_from_motor, &sizes_nm, noise(Draw::Cogging));
+            let cogging = cogging(
+                &actuators.joint_from_motor,
+                &sizes_nm,
+                noise(RandomStream::Cogging),
+            );
             actuators.ripple.extend(cogging);
         }
         if let Some(fraction) = self.torque_ripple_fraction {
-            let phase_rad: Vector<N> = phases(Draw::TorqueRipple);
+            let phase_rad: Vector<N> = phases(RandomStream::TorqueRipple);
             actuators.torque_ripple = (0..N)
                 .map(|motor| TorqueRipple {
                     motor,
@@ -128,20 +132,21 @@ impl PlantOptions {
             actuators.dead_zone_nm = Vector::repeat(dead_zone_nm);
         }
         if let Some(offset_nm) = self.amplifier_offset_nm {
-            actuators.offset_nm = signs(Draw::Offset, offset_nm);
+            actuators.offset_nm = signs(RandomStream::Offset, offset_nm);
         }
         if let Some(fraction) = self.torque_constant_fraction {
-            actuators.torque_constant = signs(Draw::TorqueConstant, fraction).add_scalar(1.0);
+            actuators.torque_constant =
+                signs(RandomStream::TorqueConstant, fraction).add_scalar(1.0);
         }
         if self.torque_shortfall_fraction.is_some() || self.torque_shortfall_spread.is_some() {
             let mean = self.torque_shortfall_fraction.unwrap_or(0.0);
             let spread = self.torque_shortfall_spread.unwrap_or(0.0);
-            let mut noise = noise(Draw::Shortfall);
+            let mut noise = noise(RandomStream::Shortfall);
             let share = Vector::from_fn(|_, _| 1.0 - mean + spread * (2.0 * noise.uniform() - 1.0));
             actuators.torque_constant = actuators.torque_constant.component_mul(&share);
         }
         if let Some(bias_rad) = self.encoder_bias_rad {
-            actuators.encoder_bias_rad = signs(Draw::EncoderBias, bias_rad);
+            actuators.encoder_bias_rad = signs(RandomStream::EncoderBias, bias_rad);
         }
         if let Some(noise_rad) = self.encoder_noise_rad {
             actuators.encoder_noise_rad = Vector::repeat(noise_rad);
@@ -181,7 +186,7 @@ impl PlantOptions {
     }
 }
 
-/// Cogging of all motors whose amplitudes at the joint add up to `size_nm` of that joint, with random phases.
+/// Returns cogging of all motors with random phases; the amplitudes at each joint sum to its `size_nm`.
 pub(crate) fn cogging<const N: usize>(
     joint_from_motor: &Matrix<N, N>,
     size_nm: &Vector<N>,
@@ -204,7 +209,7 @@ pub(crate) fn cogging<const N: usize>(
     lines
 }
 
-/// The arm on a base that is tilted by `tilt_rad` about a horizontal axis at `direction_rad` from base x.
+/// Returns the arm on a base that is tilted by `tilt_rad` about a horizontal axis at `direction_rad` from base x.
 fn tilted<const N: usize>(
     arm: &Arm<N>,
     tilt_rad: f64,
@@ -221,7 +226,7 @@ fn tilted<const N: usize>(
 /// Moves a share of the joints' friction to the motors, such that motion of one joint alone has the same friction.
 ///
 /// With `R = m2jp^-1`, Coulomb friction `c` of the motors is `|R|^T c` at a joint that moves alone, viscous friction `b`
-/// is the diagonal of `R^T diag(b) R`. Each motor gets the share of what the joint with the least friction allows.
+/// is the diagonal of `R^T diag(b) R`. Each motor gets `share` of the maximum friction that no joint exceeds.
 fn move_to_motors<const N: usize>(
     config: &mut PlantConfig<N>,
     motor_from_joint: &Matrix<N, N>,

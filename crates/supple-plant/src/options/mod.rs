@@ -58,7 +58,7 @@ pub enum PlantOptionsError {
         source: std::io::Error,
     },
     /// The text is not TOML, or has unknown keys or wrong types.
-    #[error("{file}: {message}; `supple plant list` has all options")]
+    #[error("{file}: {message}; `supple plant list` shows all options")]
     Toml {
         /// The file.
         file: String,
@@ -79,7 +79,7 @@ pub enum PlantOptionsError {
         /// Requirement on the value.
         must: String,
     },
-    /// An option without one that it needs.
+    /// An option is set without another option that it needs.
     #[error("{file}: {option} has no effect without {needs}: add {needs}, or leave {option} out")]
     Needs {
         /// The file.
@@ -152,7 +152,7 @@ impl PlantOptions {
         read.expect("the built-in sets are valid")
     }
 
-    /// Noise of the arm's encoders where none is given, as in [`PlantOptions::realistic_of`]: standard deviation at
+    /// Default noise of the arm's encoders, that of [`PlantOptions::realistic_of`]: standard deviation at
     /// the motor \[rad\].
     pub fn default_encoder_noise_rad(arm: &Description) -> f64 {
         let noise_rad = Self::realistic_of(arm).encoder_noise_rad;
@@ -198,7 +198,7 @@ impl PlantOptions {
         }
     }
 
-    /// Whether all effects are off.
+    /// Returns whether all effects are off.
     pub fn is_none(&self) -> bool {
         self.hand.is_none() && self.values().all(|(_, value)| value.is_none())
     }

@@ -114,7 +114,7 @@ impl Scene {
         self.resolve(element, &layer.material).map(drop)
     }
 
-    /// The material of `element`.
+    /// Returns the material of `element`.
     pub(crate) fn resolve(&self, element: &str, material: &str) -> Result<Material, SceneError> {
         self.material(material).ok_or_else(|| {
             let mut known = vec!["\"wood\"".to_owned(), "\"rubber\"".to_owned()];

@@ -10,9 +10,8 @@
 //! motion does not gain energy. If that linearisation nevertheless adds more than the work of `f`, the step is
 //! repeated without `C`.
 //!
-//! This is the discretisation of the multibody of the rapier engine, which is general and allocates in every step, for
-//! the one case that the arm needs; a test runs both side by side. The controller's model is recursive, in the
-//! joints' frames, and shares no code with it.
+//! The discretisation equals that of the multibody of the rapier engine, which is general and allocates in every step; a test
+//! compares both step by step. The controller's model is recursive, in the joints' frames, and shares no code with this one.
 
 use super::tip::TipForce;
 use core::array;
@@ -28,7 +27,7 @@ struct ChainLink {
     parent_from_joint: Pose,
     mass_kg: f64,
     com_m: Vector3<f64>,
-    /// About the centre of mass.
+    /// Inertia about the centre of mass.
     inertia_kg_m2: Matrix3<f64>,
 }
 
@@ -54,7 +53,7 @@ pub struct Forces<'a, const N: usize> {
     pub damping_nm_s_per_rad: &'a Vector<N>,
     /// Force on the tip.
     pub tip: &'a TipForce,
-    /// Point at which it acts, base axes \[m\].
+    /// Point at which the force acts, base axes \[m\].
     pub tip_center_m: &'a Vector3<f64>,
 }
 
@@ -222,13 +221,13 @@ impl<const N: usize> Chain<N> {
         let acceleration = solve(mass, force);
         match dt_s * velocity.amax() < UNCHECKED_RAD {
             true => acceleration,
-            false => self.checked(&links, forces, (acceleration, force), dt_s),
+            false => self.checked_acceleration(&links, forces, (acceleration, force), dt_s),
         }
     }
 
-    /// `acceleration`, or that without the linearised velocity products if it adds energy beyond the work of the
-    /// forces.
-    fn checked(
+    /// Returns `acceleration`, or the acceleration without the linearised velocity products if `acceleration` adds more energy
+    /// than the work of the forces.
+    fn checked_acceleration(
         &self,
         links: &Links<N>,
         forces: &Forces<'_, N>,

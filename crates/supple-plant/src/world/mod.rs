@@ -1,4 +1,5 @@
-//! The arm and, by the rapier engine, the objects of its scene; behind types of this crate and of nalgebra.
+//! The arm and the objects of its scene, which the rapier engine simulates; the interface has only types of this crate and of
+//! nalgebra.
 
 mod chain;
 mod convert;
@@ -31,7 +32,7 @@ pub(crate) struct World<const N: usize> {
 }
 
 impl<const N: usize> World<N> {
-    /// The configuration has been validated.
+    /// Creates the world of a validated configuration.
     pub fn new(config: &PlantConfig<N>, q: &Vector<N>, qd: &Vector<N>) -> Result<Self, PlantError> {
         let mut physics = PhysicsWorld::new();
         physics.gravity = to_glam_vector(&config.arm.gravity());
@@ -139,7 +140,7 @@ impl<const N: usize> World<N> {
     }
 }
 
-/// Rotor inertias that turn with the joints: not those behind elastic transmissions.
+/// Returns the rotor inertias that turn with the joints; rotors behind elastic transmissions do not.
 fn link_armature<const N: usize>(config: &PlantConfig<N>) -> Vector<N> {
     match config.elasticity {
         Some(_) => Vector::zeros(),

@@ -52,7 +52,7 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// The object at the current pose of `body`, its body.
+    /// Returns the object at the current pose of its body, `body`.
     pub fn object(&self, body: &RigidBody) -> Object {
         Object {
             pose: from_glam_pose(body.position()) * self.body_from_surface,
@@ -70,7 +70,7 @@ impl Surface {
         let found = found.ok().flatten()?;
         let depth_m = -found.dist;
         let normal = from_glam(&found.normal1);
-        // Halfway between the two surfaces.
+        // The contact point is halfway between the two surfaces.
         let point_m = from_glam(&found.point2) + normal * (0.5 * depth_m);
         let lever = point_m - tip.center_m;
         let own = tip.linear_m_per_s + tip.angular_rad_per_s.cross(&lever);

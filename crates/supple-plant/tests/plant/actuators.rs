@@ -77,7 +77,7 @@ fn torques_are_quantised_to_amplifier_steps_within_half_a_step() {
     }
 }
 
-/// A drive that carries the remainder gives the commanded torque in the mean, one that does not is off by up to half a step.
+/// A drive that carries the remainder gives the commanded torque in the mean; without it the mean is wrong by up to half a step.
 #[test]
 fn a_carried_remainder_makes_the_mean_torque_exact() {
     let mean_nm = |carries_remainder| {
@@ -201,7 +201,7 @@ fn hard_stops_hold_the_arm_and_dissipate_its_energy() {
 }
 
 #[test]
-fn sensor_noise_has_the_stated_size_and_no_bias() {
+fn sensor_noise_has_the_configured_deviation_and_no_bias() {
     let arm = wam4();
     let config = PlantConfig {
         force_sensor: ForceSensor {

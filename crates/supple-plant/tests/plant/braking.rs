@@ -42,7 +42,7 @@ fn a_shorted_motor_stops_its_rotor_with_its_time_constant() {
     }
 }
 
-/// Until its first torque acts a motor brakes: a weight never hangs on nothing while the drives become active.
+/// A motor brakes until its first torque acts, so that a weight is always held while the drives become active.
 #[test]
 fn a_released_motor_brakes_until_its_torque_acts() {
     let joint = Joint {
@@ -74,7 +74,7 @@ fn a_released_motor_brakes_until_its_torque_acts() {
     }
 }
 
-/// Through a transmission that couples joints, each shorted motor dissipates `b p'^2`, and the others nothing.
+/// With a transmission that couples joints, each shorted motor dissipates `b p'^2`, and other motors dissipate nothing.
 #[test]
 fn energy_lost_by_the_arm_equals_energy_dissipated_by_the_motors() {
     let mut config = described();

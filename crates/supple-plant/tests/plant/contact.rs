@@ -1,4 +1,4 @@
-//! The tip against a fixed block.
+//! Contact of the tip with a fixed block.
 
 use crate::common::{above_block, block, descent, tip_spring, wam4, wam4_at, wam4_in, weight};
 use supple_core::dynamics::{aba, crba, gravity, jacobian, kinetic_energy, tip_pose};
@@ -106,7 +106,7 @@ fn an_impact_agrees_with_runge_kutta_on_the_articulated_body_algorithm() {
     );
 }
 
-/// By `impact_oracle.py`: MuJoCo with the same law, Runge-Kutta at 10 us.
+/// Reference values from `impact_oracle.py`: MuJoCo with the same contact law, Runge-Kutta at 10 us.
 #[test]
 fn an_impact_agrees_with_mujoco() {
     let expected: serde_json::Value =

@@ -45,9 +45,9 @@ fn the_wam_has_the_actuators_and_friction_of_its_description() {
     assert!(config.actuators.motor_torque_quantum_nm[0] > 0.0);
 }
 
-/// Any control rate runs: the step is 0.2 ms, or what divides the cycle.
+/// Every control rate is possible: the physics step is 0.2 ms, or the largest smaller step that divides the cycle.
 #[test]
-fn the_step_of_the_physics_divides_the_cycle() {
+fn the_physics_step_divides_the_cycle() {
     let wam = Description::asset("wam4").unwrap();
     let usual = PlantConfig::<4>::from_description(&wam).unwrap();
     assert_eq!(usual.step_s, 2e-4);

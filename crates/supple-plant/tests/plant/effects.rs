@@ -1,4 +1,4 @@
-//! Each effect against a closed form.
+//! Compares each effect with a closed-form solution.
 
 use crate::elasticity::wheel;
 use core::f64::consts::TAU;
@@ -79,7 +79,7 @@ fn the_amplifier_has_dead_zone_gain_offset_and_ripple() {
 }
 
 #[test]
-fn the_encoder_is_biased_by_a_constant() {
+fn an_encoder_bias_shifts_the_measured_angle_by_a_constant() {
     let actuators = ActuatorModel {
         encoder_bias_rad: Vector::from([0.003]),
         ..ActuatorModel::direct()
@@ -96,7 +96,7 @@ fn the_encoder_is_biased_by_a_constant() {
 }
 
 #[test]
-fn a_hose_is_a_pendulum_about_its_preloaded_rest_angle() {
+fn a_joint_with_a_hose_oscillates_about_its_preloaded_rest_angle() {
     let config = PlantConfig {
         hose: Hose {
             stiffness_nm_per_rad: Vector::repeat(2.0),
@@ -242,10 +242,10 @@ fn friction_at_a_differential_couples_its_joints_but_not_motion_of_one_alone() {
         );
         assert!((a - b).norm() < 2e-3 * a.norm(), "{a} {b}");
     }
-    // Both joints turn such that the first motor stands still: n2 q2 = n3 q3. The second motor's friction alone is left.
+    // Both joints turn such that the first motor is at rest: n2 q2 = n3 q3. Only the friction of the second motor acts.
     let (n2, n3) = (28.25, 28.25 / 1.68);
     let qd = Vector::from([0.3, 0.3 * n2 / n3]);
-    // 0.8 of what the weaker joint allows to each motor: S3 / (2 n3) = 0.01106 against S2 / (2 n2) = 0.00943.
+    // 0.8 of the friction that the weaker joint allows each motor: S3 / (2 n3) = 0.01106, and S2 / (2 n2) = 0.00943.
     let dry_at_motor = 0.8 * (0.533 / (2.0 * n2)).min(0.372 / (2.0 * n3));
     let viscous_at_motor = 0.8 * (2.364 / (2.0 * n2 * n2)).min(0.811 / (2.0 * n3 * n3));
     let left_dry = [

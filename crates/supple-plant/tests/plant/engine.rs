@@ -1,4 +1,4 @@
-//! The arm's integration compared, step by step, with the multibody of the rapier engine, whose discretisation it has.
+//! Compares the arm's integration step by step with the multibody of the rapier engine, which has the same discretisation.
 
 use crate::common::{random_arm, wam4};
 use core::array;
@@ -144,13 +144,13 @@ fn same_motion<const N: usize>(arm: &Arm<N>, q: Vector<N>, qd: Vector<N>, steps:
 }
 
 #[test]
-fn a_moving_wam_is_that_of_the_engine_step_by_step() {
+fn a_moving_wam_equals_the_multibody_of_the_engine_in_every_step() {
     let q = Vector::from([0.3, 0.5, -0.4, 1.2]);
     same_motion(&wam4(), q, Vector::from([0.5, -0.3, 0.8, 1.0]), 5000);
 }
 
 #[test]
-fn fast_motion_is_that_of_the_engine_with_its_check_of_the_energy() {
+fn fast_motion_with_its_energy_check_equals_the_multibody_of_the_engine() {
     // From 5 rad/s on the velocity products are checked.
     for seed in 0..5 {
         let arm = random_arm::<5>(seed);

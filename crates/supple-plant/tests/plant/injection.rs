@@ -1,4 +1,4 @@
-//! Each injection has its documented effect on a plant from its start time on, and none before.
+//! Each injection has its documented effect on a plant from its start time on, and no effect before.
 
 use crate::common::wam4_in;
 use supple_core::controller::Mode;
@@ -170,7 +170,7 @@ fn a_delay_is_counted_in_control_cycles() {
 }
 
 #[test]
-fn an_encoder_of_the_wrong_sign_counts_backwards_from_where_it_was() {
+fn an_encoder_of_the_wrong_sign_counts_backwards_from_its_angle_at_the_start() {
     let mut bench = Bench::coasting(&["encoder-sign:joint=1,at-s=0.01"]);
     let mut start = 0.0;
     for cycle in 0..30 {
@@ -275,8 +275,7 @@ fn a_late_torque_acts_after_its_number_of_cycles() {
     }
 }
 
-/// An arm that the torque of its model holds stays at rest; with a load that the model lacks, it moves like the true
-/// arm.
+/// Checks that an arm held by its model's gravity torque rests without injection, and moves like the arm `truth` with it.
 fn held_by_the_model(specs: &[&str], truth: &Arm<4>) {
     let model = wam4_in([0.0, 0.0, -9.81].into());
     let config = PlantConfig::ideal(model);

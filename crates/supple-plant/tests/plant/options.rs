@@ -73,10 +73,10 @@ fn the_realistic_set_is_valid_and_has_all_effects_of_an_arm_with_cables() {
     );
 }
 
-/// The set of geared motors: friction grows with load and differs by direction, and every motor falls short of its command by
-/// what users report.
+/// In the set of geared motors friction grows with load and differs by direction, and every motor gives less than the commanded
+/// torque, by the fraction that users report.
 #[test]
-fn the_set_of_geared_motors_has_what_users_report() {
+fn the_set_of_geared_motors_has_the_friction_and_torque_shortfall_that_users_report() {
     let name = std::path::Path::new("openarm-realistic");
     let arm = Description::asset("wam4").unwrap();
     let geared = PlantOptions::chosen(&arm, Some(name), false).unwrap();
@@ -96,9 +96,9 @@ fn the_set_of_geared_motors_has_what_users_report() {
     );
 }
 
-/// The motors of an arm decide: those of a URDF are unknown, and its encoders measure at the joints.
+/// The motors of an arm determine its set: the motors of a URDF are unknown, and its encoders measure at the joints.
 #[test]
-fn an_arm_has_the_realistic_set_of_its_motors() {
+fn the_realistic_set_of_an_arm_depends_on_its_motors() {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/wam4/arm.urdf");
     let urdf_alone = UrdfName::parse(&file.display().to_string()).unwrap();
     let urdf_alone = Description::from_urdf(&urdf_alone).unwrap();
@@ -119,7 +119,7 @@ fn an_arm_has_the_realistic_set_of_its_motors() {
     }
 }
 
-/// Sizes in N m that a shoulder hardly notices would be a large part of the torque of a wrist's motor.
+/// Effects in N m that are small for a shoulder would be a large part of the torque of a wrist's motor.
 #[test]
 fn a_small_joint_has_small_effects() {
     let arm = Description::asset("wam7").unwrap();
@@ -146,7 +146,7 @@ fn a_small_joint_has_small_effects() {
     }
 }
 
-/// Breakaway against gravity: the motor must give gravity, dry friction, and a tenth of what it transmits.
+/// Breakaway against gravity: the motor must give the gravity torque, dry friction, and a tenth of the transmitted torque.
 #[test]
 fn gears_under_load_have_more_friction() {
     let friction_nm = |gear_fraction: f64| {
@@ -170,7 +170,7 @@ fn gears_under_load_have_more_friction() {
 }
 
 #[test]
-fn without_options_the_plant_keeps_its_bits() {
+fn without_options_the_plant_is_unchanged_bit_for_bit() {
     let none = PlantOptions::default();
     assert!(none.is_none() && none.line().is_empty());
     let arm = wam4();
@@ -217,7 +217,7 @@ fn every_option_changes_the_motion_and_the_same_seed_gives_the_same_bits() {
 }
 
 #[test]
-fn an_effect_draws_the_same_whether_or_not_others_are_on() {
+fn the_random_draws_of_an_effect_do_not_depend_on_other_effects() {
     let both = PlantOptions::realistic().apply(config(5)).unwrap();
     let bias = alone("encoder_bias_rad", 0.002).apply(config(5)).unwrap();
     let tilt = alone("base_tilt_rad", 0.0035).apply(config(5)).unwrap();
@@ -281,7 +281,7 @@ fn errors_name_file_option_value_and_remedy() {
 }
 
 #[test]
-fn every_option_says_what_it_does_and_where_its_size_is_from() {
+fn every_option_has_a_description_and_a_source() {
     for option in OPTIONS {
         assert!(
             option.effect.len() > 20 && option.source.len() > 10,
@@ -297,7 +297,7 @@ fn every_option_says_what_it_does_and_where_its_size_is_from() {
 }
 
 #[test]
-fn the_published_schema_is_that_of_the_options() {
+fn the_published_schema_equals_the_schema_of_the_options() {
     let published: serde_json::Value =
         serde_json::from_str(include_str!("../../../../assets/plants/plant.schema.json")).unwrap();
     let schema = serde_json::to_value(schemars::schema_for!(PlantOptions)).unwrap();

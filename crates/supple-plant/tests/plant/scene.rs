@@ -39,7 +39,7 @@ friction = 0.4
 "#;
 
 #[test]
-fn a_scene_survives_the_round_trip() {
+fn a_scene_written_as_toml_is_read_back_unchanged() {
     let scene = Scene::from_toml(TABLE, "table.toml").unwrap();
     assert_eq!(
         scene.material("wood").unwrap().friction,

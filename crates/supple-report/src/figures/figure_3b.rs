@@ -9,7 +9,7 @@ use super::ticks::{Ticks, extent};
 use crate::sections::quadrants_with_models;
 use plotters::style::text_anchor::HPos;
 use std::ops::Range;
-use supple_core::trajectory::{Piece, Quadrant};
+use supple_core::trajectory::{PathSegment, Quadrant};
 use supple_experiment::{Demo, Sample};
 
 /// Height of the legend above all rows \[px\].
@@ -119,20 +119,20 @@ fn draw_error(area: &super::panel::Area<'_>, run: &QuadrantRun<'_>) -> Result<()
     let max = extent(run.samples.iter().map(distance_mm)).end;
     let mut panel = Panel::new(
         area,
-        "distance from the reference, per piece",
+        "distance from the reference, per segment",
         Margins::default(),
         &Axis::bounded("time [s]", Ticks::around(0.0..end, 5), 0.0..end),
         &Axis::new("distance [mm]", Ticks::around(0.0..1.12 * max, 5)),
     )?;
     let top = panel.y().end;
-    for (piece, from, to) in pieces(run) {
-        if piece == Piece::Ellipse {
+    for (segment, from, to) in segments(run) {
+        if segment == PathSegment::Ellipse {
             panel.band(from, to)?;
         }
-        let name = match piece {
-            Piece::Out => "out",
-            Piece::Ellipse => "ellipse",
-            Piece::Back => "back",
+        let name = match segment {
+            PathSegment::Out => "out",
+            PathSegment::Ellipse => "ellipse",
+            PathSegment::Back => "back",
         };
         if to - from > 0.08 * end {
             panel.note(
@@ -152,14 +152,14 @@ fn draw_error(area: &super::panel::Area<'_>, run: &QuadrantRun<'_>) -> Result<()
 }
 
 /// Pieces of the trajectory in order of travel, with their start and end times \[s\].
-fn pieces(run: &QuadrantRun<'_>) -> Vec<(Piece, f64, f64)> {
-    let mut pieces: Vec<(Piece, f64, f64)> = Vec::new();
+fn segments(run: &QuadrantRun<'_>) -> Vec<(PathSegment, f64, f64)> {
+    let mut segments: Vec<(PathSegment, f64, f64)> = Vec::new();
     for s in run.samples {
-        let (piece, _, _) = run.quadrant.piece_at(s.time_s);
-        match pieces.last_mut() {
-            Some((last, _, to)) if *last == piece => *to = s.time_s,
-            _ => pieces.push((piece, s.time_s, s.time_s)),
+        let (segment, _, _) = run.quadrant.segment_at(s.time_s);
+        match segments.last_mut() {
+            Some((last, _, to)) if *last == segment => *to = s.time_s,
+            _ => segments.push((segment, s.time_s, s.time_s)),
         }
     }
-    pieces
+    segments
 }

@@ -10,8 +10,8 @@ use supple_cli::console::{json, print_line, print_status};
 use supple_cli::exit::Failure;
 use supple_cli::out::Staging;
 use supple_core::trajectory::Fourier;
-use supple_ident::SeriesLists;
-use supple_ident::design::{self, DesignOptions, ExcitationDesign, Workspace, design};
+use supple_ident::FourierCoefficients;
+use supple_ident::excitation_design::{self, DesignOptions, ExcitationDesign, Workspace, design};
 use supple_model::{Description, with_dof};
 
 /// Rows of the table per second.
@@ -29,7 +29,7 @@ struct Summary<'a> {
     /// Value of the criterion for the result.
     last_value: f64,
     #[serde(flatten)]
-    series: SeriesLists,
+    series: FourierCoefficients,
 }
 
 /// Runs `supple excite design`.
@@ -57,13 +57,13 @@ pub fn run(args: &DesignArgs) -> Result<(), Failure> {
         period_s: args.period,
         periods: args.periods,
         criterion: match args.criterion {
-            Criterion::Condition => design::Criterion::Condition,
-            Criterion::DOptimality => design::Criterion::DOptimality,
+            Criterion::Condition => excitation_design::Criterion::Condition,
+            Criterion::DOptimality => excitation_design::Criterion::DOptimality,
         },
         workspace,
         candidates: args.candidates,
         seed: args.seed,
-        ..DesignOptions::of(&moving)
+        ..DesignOptions::new(&moving)
     };
     with_dof!(arm.dof(), N => run_with_dof::<N>(&arm, &options, args))?
 }
@@ -92,10 +92,10 @@ fn run_with_dof<const N: usize>(
     let series = &found.series;
     let summary = Summary {
         arm: arm.name(),
-        moving: options.moving.clone(),
+        moving: options.excited_joints.clone(),
         criterion: match options.criterion {
-            design::Criterion::Condition => "condition",
-            design::Criterion::DOptimality => "d-optimality",
+            excitation_design::Criterion::Condition => "condition",
+            excitation_design::Criterion::DOptimality => "d-optimality",
         },
         rank: found.rank,
         condition: found.condition,
@@ -106,7 +106,7 @@ fn run_with_dof<const N: usize>(
             .find(|value| value.is_finite())
             .unwrap_or(f64::MAX),
         last_value: found.history.last().copied().unwrap_or(f64::MAX),
-        series: SeriesLists::from(series),
+        series: FourierCoefficients::from(series),
     };
     let text = json(&summary)?;
     staging.write("summary.json", format!("{text}\n").as_bytes())?;

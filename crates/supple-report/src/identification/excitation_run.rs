@@ -9,7 +9,7 @@ use supple_cli::exit::Failure;
 use supple_cli::out::Staging;
 use supple_experiment::calibrate::plant_of;
 use supple_experiment::{Calibration, excitation, slow_motion};
-use supple_ident::{ReadError, SeriesLists};
+use supple_ident::{FourierCoefficients, ReadError};
 use supple_model::{Description, with_dof};
 use supple_plant::PlantOptions;
 
@@ -22,7 +22,7 @@ struct ExcitationDesign {
     arm: String,
     moving: Vec<usize>,
     #[serde(flatten)]
-    series: SeriesLists,
+    series: FourierCoefficients,
 }
 
 #[derive(Serialize)]

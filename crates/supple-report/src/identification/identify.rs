@@ -50,12 +50,12 @@ fn procedure(args: &IdentifyArgs, period_s: f64, effects: Effects) -> Procedure 
             EffectsArg::Auto => effects,
             EffectsArg::None => Effects::default(),
         },
-        moving: (!args.moving.is_empty()).then(|| args.moving.clone()),
+        identified_joints: (!args.moving.is_empty()).then(|| args.moving.clone()),
         couplings: args.coupling.clone(),
         preparation: Preparation {
             rate_hz: args.rate,
             cutoff_hz: Some(args.cutoff),
-            keep_every: if all_mcap { 10 } else { 1 },
+            decimation_factor: if all_mcap { 10 } else { 1 },
             // supple's own logs contain commanded torques; a command acts one cycle later and for one cycle, hence
             // the delay of 1.5 periods.
             torque_delay_s: match args.torque_delay {
@@ -123,7 +123,7 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Resul
     let nominal = arm.arm::<N>()?;
     let effects = Effects::all(arm.motors().motor_from_joint.clone());
     let procedure = procedure(args, arm.settings().period_s, effects);
-    let moving = procedure.moving_joints(N)?;
+    let moving = procedure.identified_joints(N)?;
     let mut warnings = Vec::new();
     let mut steps = Steps::new(STEPS, args.quiet);
     let logs = args.logs.len() + args.validate.len();

@@ -4,7 +4,7 @@ use serde::Serialize;
 use supple_cli::arguments::CalibratePaperArgs;
 use supple_cli::console::{print_json, print_line, print_status};
 use supple_cli::exit::Failure;
-use supple_experiment::paper_procedure::{ARM, PaperProcedure, paper_procedure};
+use supple_experiment::paper_procedure::{ARM, PaperProcedureResult, paper_procedure};
 use supple_experiment::{Calibration, Mismatch};
 use supple_model::Description;
 use supple_model::paper::Parameters;
@@ -85,7 +85,7 @@ pub fn run(args: &CalibratePaperArgs) -> Result<(), Failure> {
     print(&summary)
 }
 
-fn summary(seed: u64, found: &PaperProcedure) -> Summary {
+fn summary(seed: u64, found: &PaperProcedureResult) -> Summary {
     let printed = Parameters::PUBLISHED;
     Summary {
         arm: ARM,

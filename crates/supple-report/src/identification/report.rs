@@ -160,7 +160,7 @@ pub fn summary<const N: usize>(input: &ReportInput<'_, N>) -> Summary {
     let names = input.arm.joint_names();
     let moving: Vec<String> = fit
         .columns
-        .moving()
+        .identified_joints()
         .iter()
         .map(|j| names[*j].clone())
         .collect();
@@ -296,7 +296,7 @@ fn over_angle<const N: usize>(input: &ReportInput<'_, N>, names: &[String]) -> V
     input
         .fit
         .columns
-        .moving()
+        .identified_joints()
         .iter()
         .enumerate()
         .map(of_joint)
@@ -306,7 +306,7 @@ fn over_angle<const N: usize>(input: &ReportInput<'_, N>, names: &[String]) -> V
 /// The interval of the tracking error at 5 N/m.
 fn interval<const N: usize>(input: &ReportInput<'_, N>) -> Option<ErrorInterval> {
     let motions: Vec<_> = input.held_out.iter().map(|held_out| &held_out.1).collect();
-    let moving = input.fit.columns.moving();
+    let moving = input.fit.columns.identified_joints();
     error_interval_of::<N>(input.arm, moving, &motions, STIFFNESS_N_PER_M).ok()?
 }
 
@@ -363,7 +363,7 @@ fn drawn<const N: usize>(
     let predicted: DMatrix<f64> = fit.predict_motion(motion)?;
     let every = motion.samples().div_ceil(POINTS).max(1);
     let (mut torques, mut residuals) = (Vec::new(), Vec::new());
-    for (row, &joint) in fit.columns.moving().iter().enumerate() {
+    for (row, &joint) in fit.columns.identified_joints().iter().enumerate() {
         let points = |value: &dyn Fn(usize) -> f64| -> Vec<(f64, f64)> {
             (0..motion.samples())
                 .step_by(every)

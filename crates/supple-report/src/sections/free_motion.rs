@@ -129,7 +129,7 @@ pub(super) fn quadrant(summary: &Summary) -> Section {
 fn decay(quadrant: &QuadrantSummary) -> String {
     let ratios = quadrant.edges.iter().map(|edge| {
         let ratio = edge.last_quarter_error_m / edge.peak_error_m;
-        format!("{} {ratio:.2}", edge.piece)
+        format!("{} {ratio:.2}", edge.segment)
     });
     ratios.collect::<Vec<_>>().join(", ")
 }

@@ -14,7 +14,7 @@ use supple_core::codes::fault_kind;
 use supple_core::controller::{Mode, Request};
 use supple_experiment::Step;
 use supple_experiment::procedure::{
-    Motion, MotionArm, Performed, StopCause, Stopped, moves_joints,
+    Motion, MotionArm, PerformedMotion, StopCause, Stopped, moves_joints,
 };
 use supple_ipc::message::{Drives, OperatorReply, Telemetry};
 use supple_ipc::{Domain, TelemetryReader};
@@ -370,9 +370,9 @@ impl<const N: usize> RunningArm<N> {
         }
     }
 
-    fn perform_steps(&mut self, steps: &[Step<N>]) -> Result<Performed, Failure> {
+    fn perform_steps(&mut self, steps: &[Step<N>]) -> Result<PerformedMotion, Failure> {
         let period_s = self.model.settings().period_s;
-        let mut performed = Performed::default();
+        let mut performed = PerformedMotion::default();
         let (mut unprocessed, mut queued) = (VecDeque::new(), None);
         for (number, step) in steps.iter().enumerate() {
             let sequence = match queued.take() {
@@ -514,7 +514,7 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
         last.ok_or_else(|| self.not_running())
     }
 
-    fn perform(&mut self, name: &str, steps: &[Step<N>]) -> Result<Performed, Failure> {
+    fn perform(&mut self, name: &str, steps: &[Step<N>]) -> Result<PerformedMotion, Failure> {
         let file = self.logs.join(format!("{name}.mcap"));
         let config = self.model.config::<N>()?;
         let recorder = Recorder::create(

@@ -11,7 +11,7 @@ use supple_cli::console::{print_json, print_line};
 use supple_cli::exit::Failure;
 use supple_core::controller::CycleRecord;
 use supple_ipc::message::Telemetry;
-use supple_learning::Frozen;
+use supple_learning::FreezeReason;
 
 /// Duration of the telemetry sample.
 const SAMPLE_WINDOW: Duration = Duration::from_millis(500);
@@ -70,7 +70,7 @@ impl LearningStatus {
         let of = |values: &[f64]| values[..joints].to_vec();
         LearningStatus {
             on: record.learning,
-            frozen: Frozen::of_cycle(record).map(Frozen::name),
+            frozen: FreezeReason::of_cycle(record).map(FreezeReason::name),
             viscous_nm_s_per_rad: of(record.learned_viscous_nm_s_per_rad.as_slice()),
             coulomb_nm: of(record.learned_coulomb_nm.as_slice()),
             offset_nm: of(record.learned_offset_nm.as_slice()),

@@ -1,19 +1,19 @@
-//! What requests carry, as numbers: each struct is listed once, for both directions.
+//! Conversion of the contents of requests to numbers and back: each struct is listed once, for both directions.
 
-use super::values::{RequestCode, RequestCodeError, Rest};
+use super::values::{CodeReader, RequestCode, RequestCodeError};
 use crate::config::{Gains, JointGains, RotationalGains};
 use crate::controller::{Breakaway, GainAxes, GainMatrices, GainPart, LearningSwitch, SetPoint};
 use crate::math::{Matrix3, Vector};
 use crate::model::learned::{JointMap, LearnedParameters};
 use crate::trajectory::{Arc, Fourier, Line, Probe, Quadrant, Rotation, Sinusoid};
 
-/// A value that is sent as numbers and comes back bit for bit.
+/// A value that is encoded as numbers and decoded bit for bit.
 pub(super) trait Coded: Sized {
-    /// Appends its numbers.
+    /// Appends the numbers of the value.
     fn put(&self, to: &mut RequestCode);
 
-    /// Takes its numbers.
-    fn take(from: &mut Rest<'_>) -> Result<Self, RequestCodeError>;
+    /// Decodes the value from the next numbers.
+    fn take(from: &mut CodeReader<'_>) -> Result<Self, RequestCodeError>;
 }
 
 /// Structs whose fields are sent in this order; the number after the semicolon is zero if a log lacks it.
@@ -25,7 +25,7 @@ macro_rules! coded {
                 $(self.$last.put(to);)?
             }
 
-            fn take(from: &mut Rest<'_>) -> Result<Self, RequestCodeError> {
+            fn take(from: &mut CodeReader<'_>) -> Result<Self, RequestCodeError> {
                 Ok($name {
                     $($field: Coded::take(from)?,)+
                     $($last: from.number_if_present(),)?
@@ -66,7 +66,7 @@ impl Coded for Quadrant {
         to.numbers(&[self.speed_m_per_s(), self.ramp_s(), self.corner_ramp_s()]);
     }
 
-    fn take(from: &mut Rest<'_>) -> Result<Self, RequestCodeError> {
+    fn take(from: &mut CodeReader<'_>) -> Result<Self, RequestCodeError> {
         let [centre_m, first_m, second_m] = Coded::take(from)?;
         let (speed_m_per_s, ramp_s) = (from.number(), from.number());
         let quadrant = Quadrant::new(centre_m, first_m, second_m, speed_m_per_s, ramp_s);
@@ -79,7 +79,7 @@ impl Coded for f64 {
         to.numbers(&[*self]);
     }
 
-    fn take(from: &mut Rest<'_>) -> Result<Self, RequestCodeError> {
+    fn take(from: &mut CodeReader<'_>) -> Result<Self, RequestCodeError> {
         Ok(from.number())
     }
 }
@@ -89,7 +89,7 @@ impl<const R: usize> Coded for Vector<R> {
         to.numbers(self.as_slice());
     }
 
-    fn take(from: &mut Rest<'_>) -> Result<Self, RequestCodeError> {
+    fn take(from: &mut CodeReader<'_>) -> Result<Self, RequestCodeError> {
         Ok(Vector::from_fn(|_, _| from.number()))
     }
 }
@@ -101,7 +101,7 @@ impl<T: Coded + Copy, const K: usize> Coded for [T; K] {
         }
     }
 
-    fn take(from: &mut Rest<'_>) -> Result<Self, RequestCodeError> {
+    fn take(from: &mut CodeReader<'_>) -> Result<Self, RequestCodeError> {
         const { assert!(K > 0, "an array that carries nothing") };
         let mut all = [T::take(from)?; K];
         for item in &mut all[1..] {
@@ -116,7 +116,7 @@ impl Coded for u32 {
         to.numbers(&[f64::from(*self)]);
     }
 
-    fn take(from: &mut Rest<'_>) -> Result<Self, RequestCodeError> {
+    fn take(from: &mut CodeReader<'_>) -> Result<Self, RequestCodeError> {
         let number = from.number();
         let count = number as u32;
         if f64::from(count) == number {
@@ -133,7 +133,7 @@ impl Coded for usize {
         to.numbers(&[*self as f64]);
     }
 
-    fn take(from: &mut Rest<'_>) -> Result<Self, RequestCodeError> {
+    fn take(from: &mut CodeReader<'_>) -> Result<Self, RequestCodeError> {
         Ok(u32::take(from)? as usize)
     }
 }
@@ -144,7 +144,7 @@ impl Coded for u64 {
         to.numbers(&[*self as f64]);
     }
 
-    fn take(from: &mut Rest<'_>) -> Result<Self, RequestCodeError> {
+    fn take(from: &mut CodeReader<'_>) -> Result<Self, RequestCodeError> {
         let number = from.number();
         let cycle = number as u64;
         if cycle < 1 << 53 && cycle as f64 == number {
@@ -165,7 +165,7 @@ macro_rules! coded_choices {
                 place.unwrap_or_default().put(to);
             }
 
-            fn take(from: &mut Rest<'_>) -> Result<Self, RequestCodeError> {
+            fn take(from: &mut CodeReader<'_>) -> Result<Self, RequestCodeError> {
                 const ALL: &[$name] = &[$($name::$variant),+];
                 let number = u32::take(from)?;
                 let found = ALL.get(number as usize).copied();
@@ -194,7 +194,7 @@ impl Coded for Matrix3<f64> {
         ]);
     }
 
-    fn take(from: &mut Rest<'_>) -> Result<Self, RequestCodeError> {
+    fn take(from: &mut CodeReader<'_>) -> Result<Self, RequestCodeError> {
         Coded::take(from).map(GainMatrices::symmetric)
     }
 }

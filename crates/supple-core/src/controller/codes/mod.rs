@@ -1,7 +1,7 @@
-//! Modes, faults, refusals and requests as numbers: what shared memory and logs carry.
+//! Modes, faults, refusals and requests as the numbers that shared memory and logs contain.
 //!
-//! A number once given keeps its meaning. Zero is "none" where there can be none. The bytes of a message or
-//! a log are not here.
+//! A number keeps its meaning in all versions. Zero means "none" if there can be none. Other modules define the bytes of
+//! messages and logs.
 
 mod coded;
 mod numbers;

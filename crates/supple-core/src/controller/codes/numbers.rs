@@ -1,13 +1,13 @@
-//! Tables of numbers: each entry is declared once, with its name, its meaning, and what has the number.
+//! Tables of numbers: each entry is declared once, with its name, its meaning, and the variant that has the number.
 
 /// A number of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Code {
-    /// The number; once given, it keeps its meaning.
+    /// The number, which keeps its meaning in all versions.
     pub number: u8,
-    /// Its name in logs and status lines.
+    /// Name in logs and status lines.
     pub name: &'static str,
-    /// What it means.
+    /// Meaning.
     pub meaning: &'static str,
 }
 
@@ -118,7 +118,7 @@ macro_rules! carried_variants {
         /// What has the number, with what it carries taken from `from`.
         fn $decode $(<const $size: usize>)? (
             number: u8,
-            from: &mut Rest<'_>,
+            from: &mut CodeReader<'_>,
         ) -> Result<$enum $(<$size>)?, RequestCodeError> {
             Ok(match number {
                 $($number => {

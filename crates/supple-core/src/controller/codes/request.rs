@@ -29,7 +29,7 @@
 
 use super::coded::Coded;
 use super::numbers::{carried_variants, number_table};
-use super::values::{RequestCode, RequestCodeError, Rest};
+use super::values::{CodeReader, RequestCode, RequestCodeError};
 use crate::controller::Request;
 use crate::trajectory::Trajectory;
 use core::fmt;
@@ -99,7 +99,7 @@ impl Coded for Trajectory {
         to.trajectory = encode_trajectory(self, to);
     }
 
-    fn take(from: &mut Rest<'_>) -> Result<Self, RequestCodeError> {
+    fn take(from: &mut CodeReader<'_>) -> Result<Self, RequestCodeError> {
         decode_trajectory(from.trajectory, from)
     }
 }
@@ -146,7 +146,7 @@ impl RequestCode {
     /// # Errors
     /// [`RequestCodeError`].
     pub fn request<const N: usize>(&self) -> Result<Option<Request<N>>, RequestCodeError> {
-        let mut rest = Rest {
+        let mut rest = CodeReader {
             values: self.values(),
             taken: 0,
             trajectory: self.trajectory,

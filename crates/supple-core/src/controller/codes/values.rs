@@ -1,6 +1,6 @@
-//! A request as an array of numbers, and why numbers are no request. What they mean is not here.
+//! A request as an array of numbers, and the errors of decoding; `request.rs` defines the meaning of the numbers.
 
-/// Most values that a request carries: those of an excitation of 7 joints.
+/// Maximum number of values of a request, which an excitation of 7 joints needs.
 pub const VALUES: usize = 80;
 
 /// A request as numbers.
@@ -8,15 +8,15 @@ pub const VALUES: usize = 80;
 pub struct RequestCode {
     /// One of [`request_kind`](super::request_kind).
     pub kind: u8,
-    /// Of a track or track-pose request one of [`trajectory_kind`](super::trajectory_kind), otherwise none.
+    /// For a track or track-pose request one of [`trajectory_kind`](super::trajectory_kind), otherwise none.
     pub trajectory: u8,
-    /// How many of `values` count.
+    /// Number of valid `values`.
     pub count: u8,
-    /// What the request carries, in the order of its fields; zero beyond `count`.
+    /// Values of the request's fields, in their order; zero beyond `count`.
     pub values: [f64; VALUES],
 }
 
-/// Why numbers are no request.
+/// Reason why numbers encode no request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RequestCodeError {
     /// No request has this number.
@@ -43,7 +43,7 @@ impl RequestCode {
         values: [0.0; VALUES],
     };
 
-    /// From its parts, such as a log holds them.
+    /// Creates the code from its parts, as a log contains them.
     ///
     /// # Errors
     /// More than [`VALUES`] values.
@@ -67,7 +67,7 @@ impl RequestCode {
         Ok(code)
     }
 
-    /// The values that count.
+    /// Returns the valid values.
     pub fn values(&self) -> &[f64] {
         &self.values[..usize::from(self.count).min(VALUES)]
     }
@@ -80,23 +80,23 @@ impl RequestCode {
     }
 }
 
-/// Values taken one after another; zero beyond the last, which the count then shows.
-pub(super) struct Rest<'a> {
+/// Reader of the values in order; beyond the last value it returns zeros and counts them.
+pub(super) struct CodeReader<'a> {
     pub values: &'a [f64],
     pub taken: usize,
     /// Number of the trajectory.
     pub trajectory: u8,
 }
 
-impl Rest<'_> {
-    /// The next number.
+impl CodeReader<'_> {
+    /// Returns the next number.
     pub fn number(&mut self) -> f64 {
         let number = self.values.get(self.taken).copied().unwrap_or(0.0);
         self.taken += 1;
         number
     }
 
-    /// A value that older logs lack; zero without it.
+    /// Returns a value that older logs lack; zero if it is missing.
     pub fn number_if_present(&mut self) -> f64 {
         match self.taken < self.values.len() {
             true => self.number(),

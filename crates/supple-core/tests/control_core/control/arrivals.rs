@@ -33,7 +33,7 @@ fn without(rig: &Rig<4>, joints: &[usize]) -> Input<4> {
 }
 
 #[test]
-fn a_single_lost_reply_is_coasted_over() {
+fn a_single_lost_reply_is_extrapolated() {
     for lost in [&[0][..], &[3], &[0, 1, 2, 3]] {
         let (mut rig, speed) = rotating();
         rig.q += speed * 1e-3;

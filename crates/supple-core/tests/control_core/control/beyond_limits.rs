@@ -1,5 +1,5 @@
-//! An arm that rests beyond a position limit, as one that has sunk with idle drives: it is not thrown off, and it is let
-//! out.
+//! An arm that rests beyond a position limit, for example because it has sunk with idle drives: it is not accelerated abruptly,
+//! and it can move back.
 //!
 //! Criterion, fixed before the first run: from gravity hold, a reset or drives that come back, at any angle of the soft
 //! zone and up to 0.1 rad beyond the limit, no joint is faster than 0.15 rad/s, no fault latches, and within 8 s the joint
@@ -20,7 +20,7 @@ use supple_core::{Input, Vector};
 const MAX_JOINT_RAD_PER_S: f64 = 0.15;
 const CYCLES: usize = 8000;
 
-/// How the limits come into force.
+/// Event after which the limits are enforced.
 #[derive(Clone, Copy, Debug)]
 enum Entry {
     GravityHold,
@@ -107,7 +107,7 @@ fn beyond<const N: usize>(
 }
 
 #[test]
-fn a_joint_beyond_its_limit_comes_back_slowly() {
+fn a_joint_beyond_its_limit_moves_back_slowly() {
     let entries = prop_oneof![
         Just(Entry::GravityHold),
         Just(Entry::Reset),
@@ -120,7 +120,7 @@ fn a_joint_beyond_its_limit_comes_back_slowly() {
         // The shoulder roll is held elsewhere.
         let joint = [0, 1, 3][joint];
         beyond::<4>(four(), joint, side, beyond_rad, entry)?;
-        // A gravity hold that keeps the pose takes it along.
+        // A gravity hold that keeps the pose moves its set-point with the joint.
         let config = Config {
             hold_pose: true,
             ..four()
@@ -129,9 +129,9 @@ fn a_joint_beyond_its_limit_comes_back_slowly() {
     });
 }
 
-/// What pushes the joint further out is a fault, as any joint beyond its limit.
+/// A joint that is pushed further out is a fault, like any joint beyond its limit.
 #[test]
-fn a_joint_beyond_its_limit_may_not_move_on() {
+fn a_joint_beyond_its_limit_must_not_move_further_out() {
     for side in [1.0, -1.0] {
         let config = four();
         let mut q = bent::<4>();
@@ -152,9 +152,9 @@ fn a_joint_beyond_its_limit_may_not_move_on() {
     }
 }
 
-/// A tip that rests in the margin of a wall or beyond it is not thrown back.
+/// A tip that rests in the margin of a wall or beyond it is not accelerated abruptly.
 #[test]
-fn a_tip_beyond_a_border_comes_back_slowly() {
+fn a_tip_beyond_a_border_moves_back_slowly() {
     for beyond_m in [-0.03, 0.0, 0.04, 0.2] {
         let mut config = four();
         config.collision = Collision::disabled();
@@ -177,10 +177,10 @@ fn a_tip_beyond_a_border_comes_back_slowly() {
     }
 }
 
-/// Written before the run: a joint that is further beyond its limit than an arm can sink has a wrong angle, and faults; so does
-/// one that moves beyond its limit while its drives drop out for a cycle.
+/// Fixed before the run: a joint that is further beyond its limit than an arm can sink has a wrong angle and is a fault; so is
+/// a joint that moves beyond its limit while its drives are idle for a cycle.
 #[test]
-fn what_is_far_beyond_its_limit_or_moves_there_faults() {
+fn a_joint_far_beyond_its_limit_or_moving_beyond_it_faults() {
     for (beyond_rad, faults) in [(0.09, false), (0.11, true), (1.0, true)] {
         let config = four();
         let mut q = bent::<4>();
@@ -206,10 +206,10 @@ fn what_is_far_beyond_its_limit_or_moves_there_faults() {
     );
 }
 
-/// Written before the run: a hand moves a joint out of its zone within half a second, long before the edge would have returned.
+/// Fixed before the run: a hand moves a joint out of its zone within half a second, long before the edge would have returned.
 /// From then on the soft stop is that of the configuration.
 #[test]
-fn the_edge_of_a_soft_zone_follows_a_joint_that_somebody_moves_back() {
+fn the_edge_of_a_soft_zone_follows_a_joint_that_a_person_moves_back() {
     let config = four();
     let upper_rad = config.limits.position_upper_rad[1];
     let edge_rad = upper_rad - config.limits.soft_zone_rad;
@@ -228,7 +228,7 @@ fn the_edge_of_a_soft_zone_follows_a_joint_that_somebody_moves_back() {
 
 /// The same for the margin of a workspace.
 #[test]
-fn a_margin_follows_a_tip_that_somebody_moves_back() {
+fn a_margin_follows_a_tip_that_a_person_moves_back() {
     let mut config = four();
     let at_rad = bent::<4>()[1];
     let tip_m = |angle_rad: f64| {
@@ -238,7 +238,7 @@ fn a_margin_follows_a_tip_that_somebody_moves_back() {
     };
     let [beyond, outside, inside] = [at_rad, at_rad - 0.3, at_rad - 0.15];
     let towards = (tip_m(beyond) - tip_m(outside)).normalize();
-    // Half of the margin is left where the hand leaves the tip.
+    // The hand leaves the tip in the middle of the margin.
     let depth_m = 0.025;
     config.workspace = bordered(Border::Wall {
         normal: towards,
@@ -256,8 +256,8 @@ fn a_margin_follows_a_tip_that_somebody_moves_back() {
     );
 }
 
-/// Torque of the soft stops where a hand leaves an arm that rested at the first of these angles of `joint`, and that it has moved
-/// to the second and third one, half a second each.
+/// Torque of the soft stops after a hand has moved `joint` from the first of these angles, at which it rested, to the second and
+/// third angle, in half a second each.
 fn moved_out_and_in(config: Config<4>, joint: usize, angles_rad: [f64; 3]) -> Vector<4> {
     let mut config = config;
     config.collision = Collision::disabled();

@@ -170,7 +170,7 @@ fn of_4_joints() {
 
 /// A second change of mode before the blending of the first has ended.
 #[test]
-fn a_second_change_during_blending_is_bumpless() {
+fn a_second_change_during_blending_causes_no_torque_step() {
     let mut run = Run::new(four());
     let mut previous = run.last[run.last.len() - 1].torque_nm;
     for k in 0..40 {
@@ -233,7 +233,7 @@ fn a_fault_is_not_blended() {
 
 /// Leaving a fault is bumpless as well.
 #[test]
-fn a_reset_is_bumpless() {
+fn a_reset_causes_no_torque_step() {
     let mut run = Run::new(four());
     run.rig.q = run.plant.q;
     run.rig.step(&Input {

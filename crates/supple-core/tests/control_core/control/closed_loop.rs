@@ -107,7 +107,7 @@ fn a_constant_force_is_observed_and_displaces_the_tip() {
 
 /// A frictionless arm in gravity hold is slowed by the damping and never accelerated.
 #[test]
-fn gravity_hold_takes_energy() {
+fn gravity_hold_removes_energy() {
     let config = three();
     let q = start(&config, Vector::<3>::new(0.0, 0.4, 1.4));
     let mut plant = Plant::at_rest(config.arm, q);
@@ -130,10 +130,10 @@ fn gravity_hold_takes_energy() {
     assert!(last < 1e-3 * begun, "{last} of {begun} J left");
 }
 
-/// On an arc only the base joint moves. A tip that lags by two centimetres does not make the others seem to move: their dry
-/// friction is not fed forward.
+/// On an arc only the base joint moves. With a tip that lags by two centimetres, the dry friction of the other joints is still
+/// not fed forward, because their references do not move.
 #[test]
-fn a_tip_behind_its_reference_turns_round_no_friction_of_other_joints() {
+fn a_tip_behind_its_reference_does_not_reverse_the_friction_of_other_joints() {
     let mut config = four();
     config.friction = friction().map(|friction| Friction {
         presliding_rad: 1.5e-3,
@@ -141,7 +141,7 @@ fn a_tip_behind_its_reference_turns_round_no_friction_of_other_joints() {
         ..friction
     });
     config.law.gains = Gains::isotropic(5.0, 1.5);
-    // The arm does not move; that is not to count as contact.
+    // The arm does not move, which must not count as contact.
     config.latch.threshold_n = 1e3;
     let q = start(&config, Vector::<4>::new(0.0, 0.8, 0.0, 1.8));
     let mut rig = Rig::holding(config, q);

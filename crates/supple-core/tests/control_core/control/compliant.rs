@@ -1,5 +1,5 @@
-//! Float and joint impedance with the arm in the loop: what they command, that they hold still, and that neither
-//! drives the arm.
+//! Float and joint impedance with the arm in the loop: their torques, that the arm stays at rest, and that neither
+//! adds energy to the arm.
 
 use crate::support::configs::{four, friction, seven, three, unlimited};
 use crate::support::plant::{Plant, nothing, push};
@@ -13,7 +13,7 @@ use supple_core::dynamics::{aba, gravity, kinetic_energy, tip_pose};
 use supple_core::math::Vector3;
 use supple_core::{Arm, Output, Vector};
 
-/// Without what a person who pushes the arm about would reach.
+/// A configuration without limits that a person who pushes the arm would exceed.
 fn free<const N: usize>(mut config: Config<N>) -> Config<N> {
     unlimited(&mut config);
     config.limits.joint_speed_rad_per_s.fill(50.0);
@@ -22,7 +22,7 @@ fn free<const N: usize>(mut config: Config<N>) -> Config<N> {
     config
 }
 
-/// An arm that has entered the mode and stands still.
+/// An arm at rest that has entered the mode.
 fn in_mode<const N: usize>(
     config: Config<N>,
     q: Vector<N>,
@@ -84,16 +84,16 @@ fn an_exact_model_floats_without_drift() {
     float_drifts(seven_active());
 }
 
-/// The controller compensates half of a friction that the arm has: what a hand has put in only falls.
+/// The controller compensates half of the arm's friction, so the energy from a hand only decreases.
 #[test]
-fn float_takes_energy() {
+fn float_removes_energy() {
     let mut config = seven_active();
     config.friction = friction();
     for friction in &mut config.friction {
         friction.offset_nm = 0.0;
     }
     let arm_friction = |_: &Arm<7>, _: &Vector<7>, qd: &Vector<7>| {
-        // Smooth, and nowhere smaller than the model's.
+        // The friction is smooth, and nowhere smaller than that of the model.
         Vector::from_fn(|i, _| {
             let model = config.friction[i];
             -(model.breakaway_nm * (qd[i] / 0.005).tanh() + model.viscous_nm_s_per_rad * qd[i])
@@ -108,7 +108,7 @@ fn float_takes_energy() {
         for _ in 0..80 {
             run(&mut rig, &mut plant, 50, arm_friction);
             let now = kinetic_energy(&plant.arm, &plant.q, &plant.qd);
-            // A cycle of delay in gravity and Coriolis terms moves some energy to and fro.
+            // A cycle of delay in gravity and Coriolis terms makes the energy oscillate slightly.
             prop_assert!(now <= before + 0.01 * start, "{before} J, then {now} J");
             before = now;
         }
@@ -117,7 +117,7 @@ fn float_takes_energy() {
     });
 }
 
-/// A hand that pushes at the tip moves the arm: the acceleration is what the push alone gives.
+/// A hand pushes the tip: the acceleration of the arm is that of the push alone.
 #[test]
 fn float_does_not_resist_a_push() {
     let config = free(four());
@@ -190,7 +190,7 @@ fn joint_impedance_follows_its_line_with_an_exact_model() {
 }
 
 #[test]
-fn the_spring_has_a_bound() {
+fn the_spring_torque_is_bounded() {
     let mut config = free(four());
     config.limits.joint_torque_nm.fill(40.0);
     config.joint_gains.stiffness_nm_per_rad.fill(100.0);
@@ -207,7 +207,7 @@ fn the_spring_has_a_bound() {
     assert_eq!(output.torques.stiffness[1], -10.0);
 }
 
-/// An arm that is faster than a compliant mode allows is not switched to it, and goes on; a slower one is.
+/// An arm that is faster than the limit of a compliant mode does not change to that mode and continues; a slower arm changes.
 #[test]
 fn compliant_modes_begin_below_their_speed_limits() {
     let config = four();
@@ -242,7 +242,7 @@ fn compliant_modes_begin_below_their_speed_limits() {
     }
 }
 
-/// Half of the speed limits: a request that would reach more is refused, a joint that is faster is a fault.
+/// The speed limits are halved: a request for a faster motion is refused, and a faster joint is a fault.
 #[test]
 fn compliant_joints_have_half_of_the_speed_limits() {
     let config = four();

@@ -299,7 +299,7 @@ fn a_reference_at_rest_never_latches() {
 /// Motor counts of the WAM's encoders, at the joints \[rad\].
 const COUNT_RAD: f64 = std::f64::consts::TAU / 4096.0 / 28.25;
 
-/// A latch as the WAM's, with the residuals of its model.
+/// A latch like that of the WAM, with the residuals of its model.
 fn adapting(config: &mut Config<3>) {
     config.law.gains = Gains::isotropic(5.0, 1.5);
     config.friction = friction();
@@ -325,7 +325,7 @@ fn against_motion(qd: &Vector<3>, factor: f64) -> Vector<3> {
     })
 }
 
-/// What the latch did in a sinusoid of 20 s: contacts begun, and the longest of them in cycles.
+/// Number of contacts in a sinusoid of 20 s, and the longest contact in cycles.
 fn in_free_motion(config: Config<3>, friction_factor: f64, noise_counts: f64) -> (u32, u32) {
     let mut bench = Bench::new(config);
     bench.rig.accept(Request::GravityHold);
@@ -357,7 +357,8 @@ fn in_free_motion(config: Config<3>, friction_factor: f64, noise_counts: f64) ->
     (contacts, longest)
 }
 
-/// Two counts of noise on every encoder, standard deviation. With a threshold that does not depend on residuals it latches.
+/// Every encoder has noise with a standard deviation of two counts. With a threshold that does not depend on residuals, the latch
+/// would close.
 #[test]
 fn encoder_noise_of_two_counts_does_not_trigger_the_latch() {
     let fixed = config(|_| {});

@@ -1,4 +1,4 @@
-//! Gains of the move mode and soft stops where a joint has little inertia for the delay of the loop.
+//! Gains of the move mode and soft stops of joints whose inertia is small for the delay of the loop.
 
 use crate::support::configs::{four, seven, unlimited};
 use crate::support::inverse;
@@ -57,7 +57,7 @@ fn damping_stays_below_the_stability_limit_of_the_delay() {
 }
 
 #[test]
-fn stiffness_and_damping_of_a_joint_shrink_alike_and_only_where_they_must() {
+fn stiffness_and_damping_of_a_joint_are_reduced_by_the_same_factor_and_only_if_necessary() {
     let controller = Controller::new(stiff()).expect("valid");
     let given = stiff().move_gains;
     for number in 0..50 {
@@ -122,7 +122,7 @@ fn a_move_with_too_much_damping_comes_to_rest() {
 /// Depth into a soft zone as a share of it.
 const DEPTH: f64 = 0.5;
 
-/// Torque of the soft stop of a decoupled arm's joint that moves into its zone, and what its damping was.
+/// Torque of the soft stop of a joint that moves into its zone, for an arm with decoupled joints, and the damping of that stop.
 fn soft_stop_damping(hold_nm_s_per_rad: f64, soft_nm_s_per_rad: f64) -> f64 {
     let mut config = four();
     unlimited(&mut config);
@@ -148,24 +148,24 @@ fn soft_stop_damping(hold_nm_s_per_rad: f64, soft_nm_s_per_rad: f64) -> f64 {
 }
 
 #[test]
-fn a_soft_stop_has_its_damping_where_the_delay_allows_it() {
+fn a_soft_stop_has_its_configured_damping_if_the_delay_allows_it() {
     for soft in [0.5, 2.0, 5.0] {
         let found = soft_stop_damping(1.0, soft);
         assert!((found - DEPTH * soft).abs() < 0.02 * soft, "{found}");
     }
 }
 
-/// What the delay allows is for both together: the damping of gravity hold takes its part.
+/// The limit of the delay applies to the sum of both: the damping of gravity hold reduces the damping of the soft stop.
 #[test]
-fn a_soft_stop_has_the_damping_that_hold_leaves() {
+fn a_soft_stop_has_the_damping_that_gravity_hold_leaves_within_the_limit() {
     let (alone, beside) = (soft_stop_damping(0.0, 1e3), soft_stop_damping(4.0, 1e3));
     assert!(alone > 4.0 && alone < 0.1 * 1e3, "{alone}");
     assert!(beside < alone - 3.0, "{beside} of {alone}");
 }
 
-/// An arm that enters its soft zones leaves them no faster, whatever damping the configuration has.
+/// An arm that enters its soft zones leaves them no faster, with any configured damping.
 #[test]
-fn a_soft_stop_with_too_much_damping_takes_energy() {
+fn a_soft_stop_with_too_much_damping_removes_energy() {
     for joint in [0, 1, 3] {
         for soft in [10.0, 200.0] {
             let mut config = four();

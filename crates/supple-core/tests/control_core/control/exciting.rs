@@ -58,7 +58,7 @@ fn excitation_torque_is_model_feedforward_plus_stiff_loop() {
 }
 
 #[test]
-fn a_frictionless_arm_follows_the_series_and_holds_its_end() {
+fn a_frictionless_arm_follows_the_series_and_holds_its_last_pose() {
     let config = four();
     let mut rig = Rig::holding(config, bent());
     let mut plant = Plant::at_rest(config.arm, bent());
@@ -252,9 +252,9 @@ fn ripple_feedforward_cancels_the_motors_ripple() {
     assert_eq!(rig.rest().torque_nm.norm(), 0.0);
 }
 
-/// The part of the command that cancels ripple does not reach the links: the observer takes it for no external torque.
+/// The part of the command that cancels ripple does not reach the links, and the observer does not count it as external torque.
 #[test]
-fn the_observer_leaves_the_ripple_out() {
+fn the_observer_excludes_the_ripple_compensation() {
     let mut config = four();
     let line = Harmonic {
         harmonic: 3,

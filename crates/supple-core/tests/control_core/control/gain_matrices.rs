@@ -64,9 +64,10 @@ fn holding(config: Config<7>, angle_rad: f64, axes: GainAxes) -> (Rig<7>, Plant<
     (rig, plant)
 }
 
-/// A force and a moment move the tip as the matrices say, about the axes that they were given in, also after the tip has turned.
+/// A force and a moment move the tip according to the matrices, about the axes in which they are given, also after a rotation of
+/// the tip.
 #[test]
-fn the_tip_yields_as_the_matrices_say() {
+fn the_tip_yields_according_to_the_gain_matrices() {
     for (angle_rad, axes) in [
         (0.0, GainAxes::Base),
         (-0.4, GainAxes::Base),
@@ -98,15 +99,15 @@ fn the_tip_yields_as_the_matrices_say() {
             Rotation3::from_matrix_unchecked(tip.rotation * wanted.transpose()).scaled_axis();
         let error = (in_base * turned * ROTATIONAL - moment_nm).norm() / moment_nm.norm();
         assert!(error < 0.03, "{axes:?}, {angle_rad}: {error}");
-        // What a diagonal of the same matrix would do is far from it.
+        // The diagonal of the same matrix would give a clearly different displacement.
         let diagonal = Matrix3::from_diagonal(&in_base.diagonal());
         assert!((diagonal * moved * LINEAR - force_n).norm() > 0.1 * force_n.norm());
     }
 }
 
-/// The same matrices about other axes are the same gains: the torque goes on, and so it does at the start of every ramp.
+/// The same gains, given as matrices about other axes, and the start of a ramp do not change the torque.
 #[test]
-fn a_change_of_matrices_or_axes_has_no_bump() {
+fn a_change_of_matrices_or_axes_causes_no_torque_step() {
     let (mut rig, mut plant) = holding(seven_active(), 0.5, GainAxes::Tip);
     let hand = |arm: &Arm<7>, q: &Vector<7>, qd: &Vector<7>| {
         push(arm, q, &Vector3::new(0.5, -0.3, 0.4)) - qd * 0.5
@@ -215,7 +216,7 @@ fn the_energy_of_a_resting_reference_only_falls() {
     }
 }
 
-/// What would not be passive, is beyond a limit, or cannot be carried out is refused with the value, and changes nothing.
+/// Matrices that are not passive, beyond a limit, or impossible to apply are refused with the value, and have no effect.
 #[test]
 fn unusable_matrices_are_refused() {
     let config = seven_active();

@@ -59,10 +59,10 @@ fn a_new_ramp_starts_at_the_current_gains() {
     assert_eq!(output.gains, Gains::isotropic(100.0, 20.0));
 }
 
-/// The ramp runs on the arm's time: it pauses while the state is repeated, and catches up over a
-/// gap.
+/// The ramp uses the time of the arm's states: it pauses while a state is repeated, and skips the time of missing
+/// states.
 #[test]
-fn a_ramp_runs_on_state_time() {
+fn a_ramp_advances_with_the_time_of_arm_states() {
     let mut rig = Rig::holding(four(), bent());
     rig.accept(gains_request(Gains::isotropic(200.0, 20.0), 0.1));
     let before = rig.cycle().gains;

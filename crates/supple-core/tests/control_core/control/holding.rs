@@ -300,9 +300,9 @@ fn a_joint_moved_in_idle_is_held_from_its_new_angle() {
     assert!(output.torques.joint_pd[2].abs() < 0.5);
 }
 
-/// With compliance the law takes the angles of the links, which hang below those of the encoders by gravity.
+/// With compliance the law uses the angles of the links, which gravity deflects from the encoder angles.
 #[test]
-fn soft_joints_hang_by_their_gravity() {
+fn joints_with_soft_loops_sag_under_gravity() {
     fn hangs<const N: usize>(config: Config<N>) {
         let config = Config {
             compliance_rad_per_nm: Vector::repeat(3e-4),

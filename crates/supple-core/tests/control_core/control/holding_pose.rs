@@ -33,7 +33,7 @@ fn sagging(config: Config<4>) -> Rig<4> {
 }
 
 #[test]
-fn the_torque_of_a_move_goes_on_in_gravity_hold() {
+fn the_torque_at_the_end_of_a_move_persists_in_gravity_hold() {
     let mut rig = sagging(keeping());
     let moved = rig.cycle();
     let output = rig.accept(Request::GravityHold);
@@ -41,7 +41,7 @@ fn the_torque_of_a_move_goes_on_in_gravity_hold() {
     assert_close(&output.torque_nm, &moved.torque_nm, 1e-6);
     let output = rig.cycles(1000);
     assert_close(&output.torque_nm, &moved.torque_nm, 1e-6);
-    // Without the loops it would be gravity alone.
+    // Without the position loops the torque would be gravity alone.
     let mut rig = sagging(Config {
         hold_pose: false,
         ..keeping()

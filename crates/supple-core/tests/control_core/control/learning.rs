@@ -1,5 +1,5 @@
-//! Learned terms in the controller: their torques against inverse dynamics of a changed arm, their bounds, and that they
-//! come into force without a bump and only where they may.
+//! Learned terms in the controller: their torques compared with inverse dynamics of a changed arm, their bounds, and their
+//! application without a torque step and only in permitted modes.
 
 use crate::support::configs::{four, seven, three};
 use crate::support::property::{Outcome, check, per_joint, vector3};
@@ -34,10 +34,10 @@ fn terms_of<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>) -> Term
     all
 }
 
-/// A payload's torque is what inverse dynamics of the loaded arm has more than that of the empty one; a wrong sign of
-/// mass, moment or acceleration is twice as far away as this tolerance allows.
+/// A payload's torque equals the difference of the inverse dynamics of the loaded and the empty arm. A wrong sign of
+/// mass, moment or acceleration would cause at least twice the tolerated error.
 #[test]
-fn payload_torque_is_that_of_a_loaded_arm() {
+fn payload_torque_equals_the_torque_of_a_loaded_arm() {
     fn agrees<const N: usize>(config: Config<N>) -> Outcome {
         let arm = config.arm;
         let case = (
@@ -49,7 +49,7 @@ fn payload_torque_is_that_of_a_loaded_arm() {
         check(64, case, |(q, qd, qdd, tip_m)| {
             let mass_kg = 0.3;
             let beside = loaded(&arm, mass_kg, &tip_m);
-            // At the tip itself the acceleration is that of the point: exact in motion.
+            // For a mass at the tip, the acceleration of the point is known: the torque is exact in motion.
             let at_tip = terms_of(&arm, &q, &qd);
             let accel = at_tip.jacobian.fixed_rows::<3>(0) * qdd
                 + at_tip.jacobian_dot_qd.fixed_rows::<3>(0);
@@ -58,7 +58,7 @@ fn payload_torque_is_that_of_a_loaded_arm() {
             let force = accel - arm.gravity();
             let found = payload_torque_nm(&at_tip, &force, mass_kg, &Vector3::zeros());
             assert_close(&found, &expected, 1e-9);
-            // Away from it, at rest.
+            // For a mass at a distance from the tip, the torque is exact at rest.
             let expected = gravity(&beside, &q) - gravity(&arm, &q);
             let found = payload_torque_nm(&at_tip, &-arm.gravity(), mass_kg, &(tip_m * mass_kg));
             assert_close(&found, &expected, 1e-9);
@@ -72,7 +72,7 @@ fn payload_torque_is_that_of_a_loaded_arm() {
 }
 
 #[test]
-fn tilt_torque_is_that_of_turned_gravity() {
+fn tilt_torque_equals_the_torque_of_rotated_gravity() {
     fn agrees<const N: usize>(config: Config<N>) {
         let arm = config.arm;
         check(64, (per_joint::<N>(1.5), vector3(1e-4)), |(q, tilt_rad)| {
@@ -83,7 +83,7 @@ fn tilt_torque_is_that_of_turned_gravity() {
             let expected = gravity(&turned, &q) - gravity(&arm, &q);
             let found = terms_of(&arm, &q, &Vector::zeros());
             let found = tilt_torque_nm(&found, &arm.gravity(), &tilt_rad);
-            // What a rotation of 1e-4 rad has beyond its first order.
+            // Second-order part of a rotation by 1e-4 rad.
             assert_close(&found, &expected, 1e-6);
             Ok(())
         });
@@ -94,7 +94,7 @@ fn tilt_torque_is_that_of_turned_gravity() {
 }
 
 #[test]
-fn gravity_is_its_gradient_times_gravity() {
+fn gravity_torque_is_its_gradient_times_gravity() {
     let arm = seven().arm;
     check(64, per_joint::<7>(1.5), |q| {
         let all = terms_of(&arm, &q, &Vector::zeros());
@@ -128,7 +128,7 @@ fn map_is_smooth_over_the_range() {
 }
 
 /// Over a closed motion the part of the map that depends on the angle alone does no work, and the part against the
-/// motion never drives: it compensates at most the friction of the model.
+/// motion adds no energy: it compensates at most the friction of the model.
 #[test]
 fn learned_map_adds_no_energy() {
     let mut config = four();
@@ -206,7 +206,7 @@ fn with_friction<const N: usize>(config: Config<N>) -> Config<N> {
 /// While the tip rests, new terms move the torque by no more than a thousandth of the change in a cycle, and it ends
 /// exactly at the new terms.
 #[test]
-fn new_terms_come_into_force_without_a_bump() {
+fn new_learned_terms_cause_no_torque_step() {
     fn ramps<const N: usize>(config: Config<N>) {
         let mut rig = Rig::new(with_friction(config), bent());
         rig.bring_to(Mode::Track);
@@ -245,7 +245,7 @@ fn new_terms_come_into_force_without_a_bump() {
 }
 
 #[test]
-fn terms_beyond_their_bounds_and_such_that_are_not_finite_are_refused() {
+fn terms_beyond_their_bounds_and_non_finite_terms_are_refused() {
     let mut rig = Rig::new(with_friction(four()), bent());
     rig.bring_to(Mode::Track);
     let zero = LearnedParameters::<4>::zero();
@@ -277,10 +277,10 @@ fn terms_beyond_their_bounds_and_such_that_are_not_finite_are_refused() {
     assert_eq!(rig.cycle().learned, zero);
 }
 
-/// In the modes in which people push, in gravity hold, idle and in a fault new terms are refused; those in force stay,
-/// but for a fault and idle, whose torque is the model's.
+/// In modes for hand guiding, in gravity hold, idle and in a fault new terms are refused. The present terms stay, except in a
+/// fault and in idle, whose torque is that of the model.
 #[test]
-fn terms_are_refused_where_nothing_is_learned() {
+fn learned_terms_are_refused_while_learning_is_off() {
     for mode in [
         Mode::Idle,
         Mode::GravityHold,
@@ -304,7 +304,7 @@ fn terms_are_refused_where_nothing_is_learned() {
 }
 
 #[test]
-fn reset_goes_back_to_the_terms_of_the_configuration() {
+fn a_learning_reset_restores_the_terms_of_the_configuration() {
     let mut config = with_friction(four());
     config.learned.parameters.payload_kg = 0.1;
     let mut rig = Rig::new(config, bent());
@@ -328,9 +328,9 @@ fn reset_goes_back_to_the_terms_of_the_configuration() {
     assert!(!end.learning);
 }
 
-/// The observer includes what is learned: a payload that the model lacks is no external force once it is learned.
+/// The observer includes the learned terms: a payload that the model lacks is no external force after it is learned.
 #[test]
-fn observer_includes_what_is_learned() {
+fn the_observer_includes_the_learned_terms() {
     let config = four();
     let seen = |payload_kg: f64| {
         let mut truth = config;
@@ -357,7 +357,7 @@ fn observer_includes_what_is_learned() {
 proptest! {
     #![proptest_config(crate::support::settings::config(64, 20_260_103))]
 
-    /// Whatever is learned within the bounds, the torque stays within its own.
+    /// With any learned terms within their bounds, the learned torque stays within its bound.
     #[test]
     fn learned_torque_is_bounded(share in -1.0..1.0_f64, knots in proptest::collection::vec(-1.0..1.0_f64, MAP_KNOTS)) {
         let config = with_friction(seven());

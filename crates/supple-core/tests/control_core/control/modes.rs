@@ -104,7 +104,7 @@ fn request<const N: usize>(rig: &Rig<N>, requested: RequestKind) -> Request<N> {
     }
 }
 
-/// Requests that are carried out in every mode.
+/// Requests that are executed in every mode.
 fn keeps_mode(requested: RequestKind) -> bool {
     matches!(
         requested,

@@ -48,16 +48,16 @@ fn joint_position() {
     }
 }
 
-/// Drives `rig` along `path` until it faults; `watch` sees every cycle.
+/// Drives `rig` along `path` until a fault; calls `on_cycle` in every cycle.
 fn until_fault(
     rig: &mut Rig<4>,
     path: impl Fn(f64) -> Vector<4>,
-    mut watch: impl FnMut(&Output<4>),
+    mut on_cycle: impl FnMut(&Output<4>),
 ) -> Output<4> {
     for k in 0..20_000 {
         rig.q = path(1e-3 * f64::from(k));
         let output = rig.cycle();
-        watch(&output);
+        on_cycle(&output);
         if output.fault.is_some() {
             return output;
         }

@@ -1,4 +1,4 @@
-//! The move mode, term by term, and where it ends.
+//! The move mode, term by term, and its end.
 
 use crate::support::configs::{four, friction, seven, three, unlimited};
 use crate::support::plant::{Plant, nothing};

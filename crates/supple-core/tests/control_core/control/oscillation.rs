@@ -1,4 +1,4 @@
-//! A joint that oscillates with growing speed is a fault before it is fast; other oscillations are none.
+//! A joint that oscillates with growing speed is a fault before it is fast; other oscillations are no fault.
 
 use crate::support::configs::four;
 use crate::support::plant::{Plant, nothing};
@@ -9,8 +9,8 @@ use supple_core::controller::{Fault, SafeAction};
 use supple_core::{Output, Vector};
 use supple_random::Random;
 
-/// The arm in gravity hold, with torques that come this much later than the configuration says, after a blow of 0.02 rad/s.
-/// Its output at the first fault within 4 s, with the kinetic energy \[J\].
+/// Simulates the arm in gravity hold after an impact of 0.02 rad/s, with torques that are delayed by this much more than in the
+/// configuration. Returns the output at the first fault within 4 s, and the kinetic energy \[J\].
 fn late(cycles: usize) -> Option<(Output<4>, f64)> {
     let config = four();
     let mut rig = Rig::holding(config, bent());
@@ -52,7 +52,7 @@ fn torques_that_come_late_are_a_fault_before_the_arm_is_fast() {
     assert!(late(0).is_none());
 }
 
-/// Whether swings of joint 3 with this frequency and first peak, which grow by this factor in each, are a fault.
+/// Returns whether an oscillation of joint 3 with this frequency and first peak, which grows by this factor in each swing, is a fault.
 fn is_fault(frequency_hz: f64, peak_rad_per_s: f64, growth: f64) -> bool {
     let mut rig = Rig::holding(four(), bent());
     let start_s = 20e-3;
@@ -89,10 +89,10 @@ fn only_quick_swings_that_grow_are_a_fault() {
     }
 }
 
-/// The noise of an encoder at rest makes small swings that may happen to grow: the joint that then begins to move does not
+/// Encoder noise at rest appears as small oscillations that may grow by chance; a joint that then begins to move does not
 /// oscillate.
 #[test]
-fn a_joint_that_starts_to_move_after_noise_at_rest_is_none() {
+fn a_joint_that_starts_to_move_after_noise_at_rest_is_no_growing_oscillation() {
     let (count_rad, rest_cycles) = (1e-3, 150);
     for seed in 0..100 {
         let mut rig = Rig::holding(four(), bent());

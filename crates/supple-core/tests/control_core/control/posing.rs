@@ -1,5 +1,5 @@
-//! The pose mode with the arm in the loop: it follows positions and orientations, takes energy, stops near singular poses,
-//! and refuses what it cannot do.
+//! The pose mode with the arm in the loop: it follows positions and orientations, removes energy, stops near singular poses,
+//! and refuses requests that it cannot perform.
 
 use crate::support::configs::{four, seven, seven_active, unlimited};
 use crate::support::plant::{Plant, nothing, push};
@@ -35,7 +35,7 @@ pub(super) fn pose(trajectory: Trajectory, rotation: Rotation) -> Request<7> {
     }
 }
 
-/// Without limits that a large error reaches, and with a loop that is fast beside the motions of the arm.
+/// A configuration without limits that a large error would exceed, and with a loop that is fast compared with the arm's motion.
 pub(super) fn free() -> Config<7> {
     let mut config = seven_active();
     unlimited(&mut config);
@@ -79,7 +79,7 @@ fn angle_between(a: &Matrix3<f64>, b: &Matrix3<f64>) -> f64 {
     Rotation3::from_matrix_unchecked(a * b.transpose()).angle()
 }
 
-/// Rests at a point and an orientation that were asked for, whatever path led there.
+/// The arm rests at the requested point and orientation, independent of the path.
 #[test]
 fn an_exact_model_reaches_position_and_orientation() {
     let config = seven_active();
@@ -145,7 +145,7 @@ fn an_exact_model_follows_a_sinusoid_while_the_tip_turns() {
     assert!(furthest < 3e-2, "{furthest} rad");
 }
 
-/// A push on the tip and one that turns it are yielded to as by springs, about unequal axes too.
+/// The tip yields to a force and to a moment like springs, also with unequal stiffness of the axes.
 #[test]
 fn the_tip_yields_as_springs() {
     let mut config = seven_active();
@@ -202,9 +202,9 @@ fn energy_j(
         + spring
 }
 
-/// With the reference at rest the energy falls, from any error: the reference turns within a cycle, the tip follows.
-/// Unequal stiffness too. The law sets accelerations, and the inertia of the tip changes with the pose, so that some
-/// energy moves to and fro: at most a hundredth of what there was.
+/// With the reference at rest the energy falls, from any error, also with unequal stiffness: the reference rotates within a
+/// cycle, the tip follows. The law sets accelerations, and the inertia of the tip changes with the pose, so that the energy
+/// oscillates, by at most a hundredth of its initial value.
 #[test]
 fn the_energy_of_a_resting_reference_only_falls() {
     let mut config = free();
@@ -248,7 +248,7 @@ fn a_singular_pose_is_a_fault() {
         let tip = tip_pose(&config.arm, &from).translation;
         let request = pose(Trajectory::Hold(tip), Rotation::NONE);
         let (mut rig, mut plant) = in_mode(config, from, request);
-        // Stretches the elbow and aligns the wrist against the springs: both lose directions.
+        // The push stretches the elbow and aligns the wrist against the springs; both poses are singular.
         let hand = move |_: &Arm<7>, q: &Vector<7>, qd: &Vector<7>| {
             let stiffness = Vector::from([30.0, 30.0, 20.0, 30.0, 2.0, 2.0, 0.5]);
             (-q).component_mul(&stiffness) - qd.component_mul(&stiffness)
@@ -268,9 +268,9 @@ fn a_singular_pose_is_a_fault() {
     });
 }
 
-/// A hand that is a spring and a damper pulls the arm into a singular pose, through the fault and the stop. No energy
-/// comes from the controller: that of the arm, of the law's springs until the fault and of the hand stays what it was at
-/// the start, and then falls.
+/// A hand, modelled as a spring and a damper, pulls the arm into a singular pose, through the fault and the stop. The controller
+/// adds no energy: the energy of the arm, of the law's springs until the fault, and of the hand never exceeds its initial value,
+/// and then falls.
 #[test]
 fn energy_stays_bounded_into_a_singular_pose() {
     let mut config = free();
@@ -340,7 +340,7 @@ fn a_posture_brings_the_elbow_back() {
 }
 
 #[test]
-fn what_the_pose_mode_cannot_do_is_refused() {
+fn requests_that_the_pose_mode_cannot_perform_are_refused() {
     let config = seven_active();
     let rig = Rig::holding(config, bent_wrist());
     let here = Trajectory::Hold(rig.tip());
@@ -419,9 +419,9 @@ fn fewer_than_six_active_joints_have_no_pose() {
     assert!(angle_between(&wanted, &tip.rotation) < 1e-2);
 }
 
-/// A whole motion is checked before it begins: turning on beyond a stop is refused.
+/// A whole motion is checked before it begins: a rotation beyond a joint limit is refused.
 #[test]
-fn a_turn_beyond_the_stops_is_refused_before_it_begins() {
+fn a_rotation_beyond_the_joint_limits_is_refused_before_it_begins() {
     let mut config = seven_active();
     config.limits.position_upper_rad[5] = 0.9;
     let rig = Rig::holding(config, bent_wrist());
@@ -446,7 +446,7 @@ fn a_turn_beyond_the_stops_is_refused_before_it_begins() {
 }
 
 #[test]
-fn a_tip_that_is_turned_away_faults_and_stops() {
+fn a_tip_that_is_rotated_away_from_its_reference_faults_and_stops() {
     let mut config = seven_active();
     config.pose.rotation_error_rad = 0.1;
     let mut rig = Rig::holding(config, bent_wrist());
@@ -501,7 +501,7 @@ fn rotational_gains_are_limited_and_ramped() {
     assert!((half.stiffness_nm_per_rad - mean).amax() < 0.05 * mean.amax());
 }
 
-/// What a cycle records: the reference as axis times angle, and the error.
+/// The record of a cycle contains the reference as axis times angle, and the error.
 #[test]
 fn the_record_has_reference_and_error_of_the_orientation() {
     let mut rig = Rig::holding(seven_active(), bent_wrist());

@@ -27,7 +27,7 @@ pub(super) fn guarded() -> Config<4> {
     config
 }
 
-/// In every activity and with any gains: re-enabled drives get the gravity torque only.
+/// In every mode and with any gains, re-enabled drives get only the gravity torque.
 #[test]
 fn reenabled_drives_get_the_gravity_torque_only() {
     for mode in [Mode::GravityHold, Mode::Move, Mode::Track, Mode::Excite] {
@@ -120,7 +120,8 @@ fn collision_after(before: usize, multiple: f64) -> Option<usize> {
     })
 }
 
-/// Cables that swing as the drives become active look like a torque of up to twice what the motors hold, for some milliseconds.
+/// When the drives become active, oscillating cables cause for some milliseconds an observed torque of up to twice the torque
+/// that the motors hold.
 #[test]
 fn a_collision_just_after_activation_must_be_large_or_last() {
     let later = collision_after(200, 1.5).expect("a collision");
@@ -158,8 +159,8 @@ fn an_unmodelled_load_faults_within_100_ms() {
     );
 }
 
-/// While tracking, a load that falls away with the tip is named within 150 ms; a hand that pulls it aside as strongly, or
-/// down with less than the limit, is not.
+/// While tracking, a load with which the tip falls is reported within 150 ms; a hand that pulls the tip sideways with the same
+/// force, or down with less than the limit, is not reported.
 #[test]
 fn a_load_that_falls_while_tracking_faults() {
     let tracked = |force_n: Vector3<f64>, stiffness_n_per_m: f64, cycles: usize| {
@@ -321,7 +322,7 @@ fn damping_beyond_the_delay_margin_is_refused() {
     assert_eq!(rig.request(damping_request(0.99 * limit)).refusal, None);
 }
 
-/// Runs until a speed limit is exceeded, with these torques of the motors and of somebody who pushes; whether the arm has
+/// Runs until a speed limit is exceeded, with these torques of the motors and of a person who pushes; returns whether the arm has
 /// torque in the cycle of the fault.
 fn has_torque_when_too_fast(
     request: Request<3>,
@@ -354,10 +355,10 @@ fn has_torque_when_too_fast(
     panic!("the arm never is too fast");
 }
 
-/// Written before the run: an arm whose motor dies while it follows a line has no torque from the cycle in which it is too
-/// fast; one that is struck, or that a person leads faster than it may be, is stopped with torque.
+/// Fixed before the run: an arm whose motor fails while it follows a line has no torque from the cycle of its overspeed on; an
+/// arm that is hit, or that a person guides faster than its limit, is stopped with torque.
 #[test]
-fn a_push_before_too_much_speed_brakes_only_where_a_reference_is_followed() {
+fn a_push_before_overspeed_brakes_only_in_modes_with_a_reference() {
     let from_m = Rig::holding(three(), bent()).tip();
     let line = Request::Track(Trajectory::Line(Line {
         from_m,

@@ -46,7 +46,7 @@ fn go(target_rad: Vector<4>, duration_s: f64) -> Request<4> {
 }
 
 #[test]
-fn moves_beyond_a_stop_are_refused() {
+fn moves_beyond_a_joint_limit_are_refused() {
     let limits = four().limits;
     for joint in 0..4 {
         for value_rad in [

@@ -10,7 +10,7 @@ use supple_core::math::Vector3;
 use supple_core::trajectory::{Sinusoid, Trajectory};
 use supple_core::{Arm, Output, Vector};
 
-/// Time at which the sign changes, and from when on the arm must be slow after the fault \[cycles\].
+/// Time at which the sign changes, and time after the fault from which on the arm must be slow \[cycles\].
 const REVERSED: u64 = 500;
 const SLOW_AFTER: u64 = 500;
 /// Tip speed of an arm at rest \[m/s\].
@@ -36,7 +36,7 @@ fn reversed(joint: usize) -> Vec<(Output<4>, f64, Option<u64>)> {
             rig.q[joint] = -plant.q[joint];
         }
         let output = rig.cycle();
-        // Drives that brake hold the arm: what follows does not depend on the controller.
+        // The brakes of the drives hold the arm, so the controller no longer affects the motion.
         if output.torque_off {
             plant.qd = Vector::zeros();
         } else {
@@ -71,9 +71,9 @@ fn the_arm_comes_to_rest() {
 }
 
 /// Fault while the tip follows the paper's sinusoid, and cycles from the event until then; `None` if there is no fault within
-/// 0.15 s. The event is `before` cycles before the tip passes its centre, fastest. From then on the encoder of `joint` shows
-/// `shown` of the angle by which the joint has turned since, and `wall_n_per_m` is the stiffness of a wall at the centre.
-/// The second value says whether the joint seemed to turn round.
+/// 0.15 s. The event is `before` cycles before the tip passes the centre with its maximum speed. From then on the encoder of
+/// `joint` measures the fraction `shown` of the further rotation, and `wall_n_per_m` is the stiffness of a wall at the centre.
+/// The second value is whether the measured motion of the joint reversed.
 fn fault_after(
     joint: usize,
     before: u64,
@@ -95,7 +95,7 @@ fn fault_after(
     let mut rig = Rig::holding(config, start.position_rad);
     let mut plant = Plant::at_rest(config.arm, start.position_rad);
     rig.accept(Request::Track(Trajectory::Sinusoid(sinusoid)));
-    // With its ramp it passes its centre, fastest, after 4.5 s.
+    // With the ramp, the tip passes the centre with its maximum speed after 4.5 s.
     let reversed = 4500 - before;
     let (mut at_rad, mut before_rad_per_s, mut turned_round) = (0.0, 0.0, false);
     for cycle in 0..reversed + 150 {
@@ -128,7 +128,7 @@ fn fault_after(
 }
 
 #[test]
-fn a_reversal_while_tracking_is_named_soon() {
+fn a_reversed_encoder_while_tracking_is_detected_soon() {
     for joint in [1, 3] {
         for before in [0, 100, 200] {
             let (found, _) = fault_after(joint, before, |turned_rad| -turned_rad, 0.0);
@@ -141,14 +141,15 @@ fn a_reversal_while_tracking_is_named_soon() {
     }
 }
 
-/// Whether the rule of sudden reversals has found the fault: its limit is six times that of the other rule, 4 N m here.
+/// Returns whether the test for sudden reversals has detected the fault: its limit is six times that of the other test, 4 N m for this
+/// arm.
 fn is_sudden_reversal(found: Option<(Fault, u64)>) -> bool {
     matches!(found, Some((Fault::MotionAgainstTorque { limit_nm, .. }, _)) if limit_nm > 5.0)
 }
 
-/// An encoder that goes on with the opposite sign and half of the speed is found later, by the other rule.
+/// An encoder that continues with the opposite sign and half of the speed is detected later, by the other test.
 #[test]
-fn a_joint_that_returns_with_half_of_its_speed_has_no_reversed_encoder() {
+fn a_joint_that_returns_with_half_of_its_speed_is_no_reversed_encoder() {
     for joint in [1, 3] {
         let (found, turned_round) = fault_after(joint, 0, |turned_rad| -0.5 * turned_rad, 0.0);
         assert!(turned_round, "joint {joint}");
@@ -156,7 +157,8 @@ fn a_joint_that_returns_with_half_of_its_speed_has_no_reversed_encoder() {
     }
 }
 
-/// Written before the run: a tip that hits a hard wall at its highest speed and rebounds with most of it shows no reversed encoder.
+/// Fixed before the run: if the tip hits a hard wall at its maximum speed and rebounds with most of it, no reversed encoder is
+/// reported.
 #[test]
 fn a_rebound_from_a_wall_is_no_reversed_encoder() {
     for wall_n_per_m in [5e3, 2e4, 1e5] {
@@ -167,7 +169,7 @@ fn a_rebound_from_a_wall_is_no_reversed_encoder() {
 }
 
 /// Fault if friction opposes joint 1 with `friction_nm` \[N m\] while it speeds up by this much
-/// \[rad/s^2\] for half a second, guided by somebody.
+/// \[rad/s^2\] for half a second, guided by a person.
 fn guided(friction_nm: f64, acceleration_rad_per_s2: f64) -> Option<Fault> {
     let mut config = four();
     config.plausible.against_share = 0.05;
@@ -183,7 +185,8 @@ fn guided(friction_nm: f64, acceleration_rad_per_s2: f64) -> Option<Fault> {
     })
 }
 
-/// A hand that guides a joint slowly overcomes its friction; what turns it faster than that, against its torque, is no hand.
+/// A hand that guides a joint slowly overcomes its friction; a faster acceleration against the joint's torque is not caused by a
+/// hand.
 #[test]
 fn a_hand_that_guides_against_friction_is_no_reversed_encoder() {
     let limit_nm = 0.05 * four().limits.joint_torque_nm[0];

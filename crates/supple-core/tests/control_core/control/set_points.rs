@@ -1,4 +1,4 @@
-//! Set-points of the tip: the reference follows them without a jump, ends at rest, and no refused one changes anything.
+//! Set-points of the tip: the reference follows them without a jump and ends at rest; a refused set-point has no effect.
 
 use crate::support::configs::{four, unlimited};
 use crate::support::plant::Plant;
@@ -38,7 +38,7 @@ fn drive(rig: &mut Rig<4>, plant: &mut Plant<4>, request: Option<Request<4>>) ->
 }
 
 #[test]
-fn a_stream_of_a_line_is_the_line() {
+fn a_stream_of_set_points_on_a_line_follows_the_line() {
     let (mut rig, mut plant) = held();
     let (mut other, mut other_plant) = (rig.clone(), plant.clone());
     let from_m = rig.tip();
@@ -74,12 +74,12 @@ fn a_stream_of_a_line_is_the_line() {
 }
 
 #[test]
-fn the_reference_never_jumps_and_silence_ends_at_rest() {
+fn the_reference_never_jumps_and_rests_after_the_last_set_point() {
     let (mut rig, mut plant) = held();
     let mut last = drive(&mut rig, &mut plant, None);
     let mut next = beside(&rig, [0.01, 0.0, 0.0], 40);
     for k in 0..2000_u64 {
-        // At irregular times, to both sides, with speed at its end; the last one after a second.
+        // Set-points at irregular times, to both sides, with a final speed; the last set-point comes after a second.
         let request = [3, 17, 18, 19, 250, 251, 600, 990].contains(&k).then(|| {
             let side = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
             next = beside(&rig, [0.0, 0.01 * side, 0.0], 300 + k / 10);
@@ -99,14 +99,14 @@ fn the_reference_never_jumps_and_silence_ends_at_rest() {
     }
     let end = last.reference.expect("still held");
     assert_eq!(end.velocity.norm() + end.acceleration.norm(), 0.0);
-    // It went on behind the last point, by less than its speed in the time of the stop.
+    // The reference continued beyond the last set-point, by less than its speed times the time of the stop.
     let behind = (end.position - next.position_m).norm();
     assert!(behind > 0.0 && behind < 0.08 * 0.2, "{behind} m");
     assert_eq!(last.mode, Mode::Track);
 }
 
 #[test]
-fn refused_ones_say_why_and_change_nothing() {
+fn a_refused_set_point_has_a_reason_and_no_effect() {
     let (mut rig, mut plant) = held();
     drive(&mut rig, &mut plant, None);
     let good = Request::SetPoint(beside(&rig, [0.01, 0.0, 0.0], 100));
@@ -140,7 +140,7 @@ fn refused_ones_say_why_and_change_nothing() {
 }
 
 #[test]
-fn set_points_on_their_way_do_not_resume_an_ended_motion() {
+fn pending_set_points_do_not_resume_an_ended_motion() {
     for end in [Request::GravityHold, Request::Idle, Request::Float] {
         let (mut rig, mut plant) = held();
         let point = Request::SetPoint(beside(&rig, [0.01, 0.0, 0.0], 100));
@@ -153,7 +153,7 @@ fn set_points_on_their_way_do_not_resume_an_ended_motion() {
 }
 
 #[test]
-fn the_check_before_the_loop_knows_the_reach() {
+fn the_check_before_the_control_loop_rejects_points_out_of_reach() {
     let (rig, _) = held();
     let check = |set_point| check_motion(&rig.controller, &rig.q, &Request::SetPoint(set_point));
     assert_eq!(check(beside(&rig, [0.02, 0.0, 0.0], 30)), Ok(()));

@@ -98,7 +98,7 @@ const LOSSES: [Loss; 8] = [
 ];
 
 #[test]
-fn no_loss_increases_the_stiffness_in_any_mode() {
+fn no_lost_input_increases_the_stiffness_in_any_mode() {
     let mut config = four();
     unlimited(&mut config);
     for mode in [Mode::Idle, Mode::GravityHold, Mode::Move, Mode::Track] {

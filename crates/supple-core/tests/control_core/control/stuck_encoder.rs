@@ -8,7 +8,7 @@ use supple_core::controller::{Fault, Request, SafeAction};
 use supple_core::math::Vector3;
 use supple_core::trajectory::{Line, Trajectory};
 
-/// Joints that nothing but their motion checks: their friction holds any torque.
+/// Joints for which only the check of motion is active: their friction holds any torque.
 fn of_motion() -> Config<4> {
     let mut config = guarded();
     config.plausible.stuck_rad = 0.1;
@@ -33,7 +33,7 @@ fn a_stuck_encoder_faults() {
 }
 
 /// Two motors drive joints 1 and 2 together, as the differential of a WAM: with the encoder of one stuck, the angles of both
-/// joints go on changing, each by a half.
+/// joints still change, each by half of the motion.
 #[test]
 fn a_stuck_encoder_of_a_motor_of_two_joints_faults() {
     let moved = |stuck: bool| {
@@ -63,7 +63,7 @@ fn a_stuck_encoder_of_a_motor_of_two_joints_faults() {
 }
 
 /// An impact that stops a joint within three cycles, and friction that holds it afterwards, are no stuck encoder; an encoder
-/// that shows the joint's whole speed and then nothing is one.
+/// that measures the joint's full speed and then no motion is stuck.
 #[test]
 fn an_impact_is_no_stuck_encoder() {
     let stopped = |last_steps: &[f64]| {
@@ -87,8 +87,9 @@ fn an_impact_is_no_stuck_encoder() {
     );
 }
 
-/// Encoders that all stopped count as stuck after half of the way that a single one may be unchanged, in a mode of joint
-/// references, if they are too coarse to show presliding. Under the law of the tip dry friction may hold all joints of an arm.
+/// In a mode with joint references, encoders that have all stopped count as stuck after half of the distance for which a single
+/// encoder may be unchanged, if they are too coarse to resolve presliding. Under the impedance law dry friction may hold all
+/// joints.
 #[test]
 fn all_encoders_stuck_at_once_fault_sooner() {
     let stuck = |of_tip: bool, jitter_rad: f64| {
@@ -134,8 +135,8 @@ fn all_encoders_stuck_at_once_fault_sooner() {
     }
 }
 
-/// A contact that no encoder has moved in is one that stuck encoders make: it does not suspend the check. A contact in
-/// which the arm still moved does, until its reference is far away.
+/// A contact during which no encoder has changed is caused by stuck encoders and does not suspend the check. A contact during
+/// which the arm moved suspends the check until the reference is far away.
 #[test]
 fn stuck_encoders_are_no_contact() {
     let contact = |jolt: bool| {
@@ -187,9 +188,9 @@ fn an_arm_stopped_by_braking_can_be_reenabled() {
     }
 }
 
-/// Lets the reference of a law move away from a blocked arm in two seconds, whose joints yield by `yielding_rad` in each tenth of
-/// these cycles, and then not at all for a second; one motor of the differential also moves to and fro by `flicker_rad`, at first
-/// every 10 cycles, then every 50. The fault, and the force of the law before \[N\].
+/// Moves the reference of the law away from a blocked arm in two seconds. The joints yield by `yielding_rad` in every tenth
+/// cycle, and then rest for a second; one motor of the differential also moves back and forth by `flicker_rad`, first every 10
+/// cycles, then every 50. Returns the fault, and the force of the law before the fault \[N\].
 fn held_under_a_stiff_law(
     mut config: Config<4>,
     stiffness_n_per_m: f64,
@@ -232,9 +233,9 @@ fn held_under_a_stiff_law(
     (None, stiffness_n_per_m * error_m)
 }
 
-/// A stiff law may not push with more than dry friction holds while an encoder stays unchanged, whatever counts as contact.
-/// An encoder that shows how the arm yields to the torque does not stick, even if the torque remains when it rests; nor does one
-/// under a torque that friction holds.
+/// A stiff law must not push with more than the dry friction while an encoder stays unchanged, independent of detected contact.
+/// An encoder is not stuck if it measures how the arm yields to the torque, even if the torque remains when the arm rests, or if
+/// friction holds the torque.
 #[test]
 fn a_stiff_law_does_not_push_a_stuck_encoder() {
     for stiffness_n_per_m in [200.0, 1000.0] {
@@ -253,7 +254,7 @@ fn a_stiff_law_does_not_push_a_stuck_encoder() {
     assert_eq!(held_under_a_stiff_law(guarded(), 5.0, 0.0, 0.0).0, None);
 }
 
-/// The step of a coarse encoder makes the observed torque of a loaded joint dip: its return is no torque that grows.
+/// The step of a coarse encoder briefly reduces the observed torque of a loaded joint; its recovery is no growing torque.
 #[test]
 fn steps_of_a_coarse_encoder_under_load_are_no_growing_torque() {
     let mut config = guarded();

@@ -1,5 +1,5 @@
 //! Requests at the wrong moment: a reset while the arm still moves, the same request in every cycle, a ramp on a ramp or
-//! with a wrong encoder, gains that are still changing, cycle numbers that go back in a fault.
+//! with a wrong encoder, gains that are still changing, cycle numbers that decrease in a fault.
 //!
 //! Criterion, fixed before the first run: no request makes an arm faster than it was, and none ends the supervision of
 //! a fault.
@@ -17,7 +17,7 @@ use supple_core::math::Vector3;
 use supple_core::trajectory::Fourier;
 use supple_core::{Config, Friction, Trajectory, Vector};
 
-/// An arm in gravity hold that somebody has set in motion, one cycle before a fault that is no defect.
+/// An arm in gravity hold that a person has set in motion, one cycle before a fault without a defect.
 fn struck<const N: usize>(config: Config<N>, speed: &Vector<N>) -> (Rig<N>, Plant<N>) {
     let mut rig = Rig::holding(config, bent());
     let mut plant = Plant::at_rest(config.arm, bent());
@@ -36,7 +36,7 @@ fn energy_j<const N: usize>(plant: &Plant<N>) -> f64 {
     kinetic_energy(&plant.arm, &plant.q, &plant.qd)
 }
 
-/// A reset is asked for in every cycle from `after` on; every cycle after that asks for gravity hold.
+/// Requests a reset in every cycle from `after` on, and gravity hold after the reset.
 fn reset_is_harmless<const N: usize>(
     config: Config<N>,
     speed: &Vector<N>,
@@ -109,7 +109,7 @@ fn a_reset_of_a_moving_arm_is_refused_with_its_speed() {
 
 /// The torque of a loaded spring must be gone after five times `handover_s` although the same request comes in every cycle.
 /// An arm that falls with idle drives is not caught at speed: neither by gravity hold nor by a reset of a fault that brakes. It is
-/// held again where it is as slow as one that sinks on shorted motors.
+/// held again when it is as slow as an arm that sinks on shorted motors.
 #[test]
 fn an_arm_is_not_held_while_it_falls() {
     let config = four();
@@ -196,9 +196,9 @@ fn repeated_requests_do_not_keep_the_last_torque() {
     }
 }
 
-/// Modes that follow one another faster than torques are blended make no jump.
+/// Mode changes in faster succession than the blending of torques cause no torque step.
 #[test]
-fn changes_during_a_handover_are_bumpless() {
+fn changes_during_a_handover_cause_no_torque_step() {
     let config = three();
     let mut rig = Rig::holding(config, bent());
     let tip = rig.tip() + Vector3::new(0.04, 0.0, -0.02);
@@ -226,7 +226,7 @@ fn changes_during_a_handover_are_bumpless() {
     }
 }
 
-/// Gains that are still in force count, not only those at the end of their ramp.
+/// The check includes the present gains of a ramp, not only its final gains.
 #[test]
 fn damping_that_is_being_ramped_down_is_checked() {
     let mut config = three();
@@ -283,7 +283,7 @@ fn every_period_of_an_excitation_is_checked() {
     let periods = |count: f64| {
         let mut series = series;
         series.ramp_s = series.period_s();
-        // Samples at 128 equal intervals of so many half-periods see the reversals only.
+        // Samples at 128 equal intervals would all be at reversals of so many half-periods.
         series.duration_s = count * series.period_s() + 2.0 * series.ramp_s;
         series
     };
@@ -298,11 +298,11 @@ fn every_period_of_an_excitation_is_checked() {
 }
 
 #[test]
-fn cycle_numbers_that_go_back_do_not_end_the_supervision_of_a_fault() {
+fn cycle_numbers_that_decrease_do_not_end_the_supervision_of_a_fault() {
     let config = three();
     let (mut rig, mut plant) = struck(config, &Vector::from([0.3, 0.3, 0.3]));
     rig.cycle = 0;
-    // Somebody pushes as hard as the motors pull: the arm goes on moving.
+    // A person pushes with the force of the motors, so that the arm continues to move.
     let push = |_: &supple_core::Arm<3>, _: &Vector<3>, qd: &Vector<3>| qd.map(|v| 60.0 * v);
     for k in 0..400 {
         let output = rig.drive(&mut plant, None, push);
@@ -331,7 +331,7 @@ fn a_ramp_during_a_move_is_refused() {
 
 /// The model lacks a fifth of the weight; position loops hold it, then ramps on the same and on another joint begin.
 #[test]
-fn ramps_after_one_another_hold_what_the_model_lacks() {
+fn consecutive_ramps_hold_the_torque_that_the_model_lacks() {
     let config = three();
     let mut rig = Rig::holding(config, bent());
     let mut plant = Plant::at_rest(config.arm, bent());
@@ -370,8 +370,8 @@ fn ramps_after_one_another_hold_what_the_model_lacks() {
     }
 }
 
-/// A breakaway ramp whose encoder shows `shown` of the true angle and of the start; returns the first fault, the largest
-/// speed of the tip \[m/s\], and the mode at the end of the ramp or of the fault.
+/// Runs a breakaway ramp whose encoder measures a combination (`shown`) of true and initial angle; returns the first fault, the
+/// largest speed of the tip \[m/s\], and the mode at the end of the ramp or of the fault.
 fn ramped(shown: impl Fn(f64, f64) -> f64) -> (Option<Fault>, f64, Mode) {
     let mut config = three();
     let dry_nm = 1.0;
@@ -379,12 +379,12 @@ fn ramped(shown: impl Fn(f64, f64) -> f64) -> (Option<Fault>, f64, Mode) {
     config.plausible.stuck_rad = 0.1;
     let mut rig = Rig::holding(config, bent());
     let mut plant = Plant::at_rest(config.arm, bent());
-    // Dry friction that holds the joint up to `dry_nm`, nearly.
+    // Smoothed dry friction holds the joint up to about `dry_nm`.
     let friction = |_: &supple_core::Arm<3>, _: &Vector<3>, qd: &Vector<3>| {
         Vector::from([-4.0 * qd[0], -dry_nm * (qd[1] / 0.002).tanh(), -4.0 * qd[2]])
     };
     let start: Vector<3> = plant.q;
-    // The encoder has shown that it is fine enough for presliding.
+    // The encoder has resolved presliding before.
     rig.q[1] += 5e-5;
     rig.cycle();
     rig.q[1] -= 5e-5;
@@ -409,8 +409,8 @@ fn ramped(shown: impl Fn(f64, f64) -> f64) -> (Option<Fault>, f64, Mode) {
     panic!("the ramp does not end");
 }
 
-/// Written before the run: an encoder that no longer changes, or shows the opposite, ends the ramp with its fault before the
-/// tip is faster than 0.25 m/s; a good one ends it without a fault.
+/// Fixed before the run: an encoder that no longer changes, or has the wrong sign, ends the ramp with its fault before the
+/// tip is faster than 0.25 m/s; with a correct encoder the ramp ends without a fault.
 #[test]
 fn a_ramp_ends_with_a_wrong_encoder() {
     let (fault, speed, _) = ramped(|_, start| start);
@@ -429,8 +429,8 @@ fn a_ramp_ends_with_a_wrong_encoder() {
     assert_eq!((fault, mode), (None, Mode::GravityHold));
 }
 
-/// A joint that turns against a ramp of less than half of what makes it slide is pushed, or its gravity torque is wrong; one
-/// that turns against more has a wrong sign.
+/// If a joint moves against a ramp of less than half of its breakaway torque, it is pushed, or its gravity torque is wrong; if it
+/// moves against more torque, its encoder has the wrong sign.
 #[test]
 fn a_push_against_a_weak_ramp_ends_it_without_a_fault() {
     for (share, is_fault) in [(0.3, false), (0.7, true)] {

@@ -1,4 +1,4 @@
-//! Borders and zones of the tip: what pushes it back, what ends the motion, and what is refused before.
+//! Borders and zones of the tip: forces that push the tip back, faults that end the motion, and refused paths.
 
 use crate::support::configs::four;
 use crate::support::plant::{Plant, push};
@@ -43,7 +43,7 @@ fn zoned(tip_speed_m_per_s: f64, tip_force_n: f64) -> Workspace {
     }
 }
 
-/// The arm with this workspace; nothing else stops it.
+/// The arm with this workspace and no other effective limits.
 fn only(workspace: Workspace) -> Config<4> {
     let mut config = four();
     config.collision = Collision::disabled();
@@ -52,7 +52,7 @@ fn only(workspace: Workspace) -> Config<4> {
     config
 }
 
-/// A box from which the tip is kept out, `gap_m` before the tip along an axis.
+/// A box that the tip must not enter, at the distance `gap_m` from the tip along an axis.
 fn box_before(gap_m: f64, axis: usize, sign: f64) -> Border {
     let mut towards = Vector3::zeros();
     towards[axis] = sign;
@@ -63,8 +63,8 @@ fn box_before(gap_m: f64, axis: usize, sign: f64) -> Border {
     }
 }
 
-/// The force of a border's margin is that of a spring, and of a damper against motion towards it, along its normal; further
-/// away there is none. Distances by their definition: of a box, the one along the axis on which the point is furthest.
+/// The force of a border's margin is the force of a spring, and of a damper against motion towards the border, along the normal;
+/// outside of the margin it is zero. The distance to a box is measured along the axis on which the point is furthest.
 #[test]
 fn the_margin_is_a_spring_and_a_damper_towards_the_border() {
     type Case = ([Vector3<f64>; 3], f64);
@@ -89,9 +89,10 @@ fn the_margin_is_a_spring_and_a_damper_towards_the_border() {
     });
 }
 
-/// A push of 12 N is held by 400 N/m within the margin of 50 mm; one of 30 N goes through it, and the fault names the border.
+/// A stiffness of 400 N/m holds a push of 12 N within the margin of 50 mm; a push of 30 N moves the tip beyond it, and the fault
+/// names the border.
 #[test]
-fn a_box_holds_the_tip_off_and_faults_beyond() {
+fn a_box_repels_the_tip_and_a_tip_inside_it_is_a_fault() {
     for (axis, sign) in [(2, -1.0), (2, 1.0), (0, 1.0)] {
         let config = only(bordered(box_before(0.08, axis, sign)));
         let mut force_n = Vector3::zeros();
@@ -118,7 +119,7 @@ fn a_box_holds_the_tip_off_and_faults_beyond() {
 
 /// A tip that is beyond a border when the arm is switched on may be moved back, not further.
 #[test]
-fn a_tip_beyond_a_border_may_come_back() {
+fn a_tip_beyond_a_border_may_move_back() {
     let mut workspace = bordered(box_before(-0.02, 2, -1.0));
     workspace.stiffness_n_per_m = 0.0;
     workspace.damping_n_s_per_m = 0.0;
@@ -143,7 +144,7 @@ fn a_tip_beyond_a_border_may_come_back() {
     );
 }
 
-/// In a zone the law pulls with its force at most, and a larger one on the tip ends the motion.
+/// In a zone the spring force of the law is at most the zone's limit, and a larger external force on the tip ends the motion.
 #[test]
 fn a_zone_bounds_the_force() {
     let config = only(zoned(f64::MAX, 8.0));
@@ -194,7 +195,7 @@ fn a_zone_bounds_the_force() {
     );
 }
 
-/// A tip that is faster than four fifths of its zone's limit is slowed, one beyond the limit ends the motion.
+/// A tip faster than four fifths of its zone's limit is slowed; a tip faster than the limit is a fault.
 #[test]
 fn a_zone_bounds_the_speed() {
     let workspace = Workspace {
@@ -229,7 +230,7 @@ fn a_zone_bounds_the_speed() {
     );
 }
 
-/// A path into a box is refused with its border, one beside it is not.
+/// A path into a box is refused with the box's border; a path beside the box is accepted.
 #[test]
 fn a_path_into_a_box_is_refused() {
     let rig = Rig::holding(only(bordered(box_before(0.08, 2, -1.0))), bent());

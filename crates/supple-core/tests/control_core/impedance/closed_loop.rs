@@ -66,7 +66,7 @@ fn feedback<const N: usize>(scene: &Scene<N>, arm: &Arm<N>) -> Vector3<f64> {
         + b.component_mul(&(scene.reference.velocity - tip_velocity))
 }
 
-/// Whether the inverse is undamped in this pose.
+/// Returns whether the inverse is undamped in this pose.
 fn regular<const N: usize>(scene: &Scene<N>, arm: &Arm<N>, roles: &[Role; N]) -> bool {
     scene.task(arm, roles).min_singular_value_m > SINGULAR_BELOW_M
 }
@@ -172,7 +172,7 @@ fn chosen_inertia_of_4_active_joints() {
 
 /// A measured force with the choice `M = Lambda` gives the same torque as no measurement.
 #[test]
-fn choosing_the_arms_own_inertia_changes_nothing() {
+fn choosing_the_arms_own_inertia_does_not_change_the_torque() {
     let (arm, roles) = (wam3(), [Role::Active; 3]);
     check(200, scene::<3>(), |scene| {
         if !regular(&scene, &arm, &roles) {
@@ -210,7 +210,7 @@ fn the_inverse_of_3_active_joints_is_the_jacobians() {
 
 /// With held joints `Jb` is a right inverse of the Jacobian that does not move them.
 #[test]
-fn the_inverse_leaves_held_joints_alone() {
+fn the_inverse_does_not_move_held_joints() {
     let (arm, roles) = (wam7(), seven().roles);
     check(200, scene::<7>(), |scene| {
         let task = scene.task(&arm, &roles);

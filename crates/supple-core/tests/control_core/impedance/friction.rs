@@ -1,4 +1,4 @@
-//! The friction feed-forward: it has no stiffness; its dry part fades, the rest stays.
+//! The friction feed-forward has no stiffness; its dry part fades, the other parts stay.
 
 use crate::support::arms::{wam3, wam4};
 use crate::support::configs::{four, friction};
@@ -29,7 +29,7 @@ fn feedforward(scene: &Scene<4>, velocity: FrictionVelocity) -> Vector<4> {
         .friction
 }
 
-/// Bit-identical: this would reveal any stiffness in the friction term.
+/// The torques are bit-identical; any stiffness in the friction term would change them.
 #[test]
 fn friction_feedforward_is_independent_of_the_position_error() {
     check(300, (scene::<4>(), vector3(2.0)), |(scene, position)| {
@@ -46,7 +46,7 @@ fn friction_feedforward_is_independent_of_the_position_error() {
 }
 
 #[test]
-fn friction_at_the_reference_velocity_ignores_the_measured_one() {
+fn friction_at_the_reference_velocity_does_not_depend_on_the_measured_velocity() {
     check(300, (scene::<4>(), vector3(2.0)), |(scene, other)| {
         let mut moving = scene.clone();
         moving.qd = Vector::<4>::new(other.x, other.y, 0.3, other.z);
@@ -119,7 +119,7 @@ fn fading_keeps_offset_and_viscous_friction() {
 
 /// A held joint has no moving reference: its feed-forward is the offset only.
 #[test]
-fn held_joints_get_their_offset_alone() {
+fn held_joints_get_only_their_friction_offset() {
     check(200, scene::<4>(), |scene| {
         for velocity in [FrictionVelocity::Reference, FrictionVelocity::Measured] {
             let found = feedforward(&scene, velocity)[2];
@@ -130,7 +130,7 @@ fn held_joints_get_their_offset_alone() {
 }
 
 /// Reason for using the reference's velocity: with an exact monotone model, the remaining friction
-/// takes energy from the motion of the error for any motion of the arm.
+/// removes energy from the motion of the error for any motion of the arm.
 #[test]
 fn the_residual_friction_damps_the_error() {
     let (arm, roles) = (

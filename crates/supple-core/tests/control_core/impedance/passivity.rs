@@ -1,4 +1,4 @@
-//! What takes and what adds energy, at any pose, singular ones included: the section "Passivity" of `docs/theory.md`.
+//! Terms that remove or add energy, in any pose, including singular poses: the section "Passivity" of `docs/theory.md`.
 
 use crate::common::numeric::derivative;
 use crate::common::random::{Case, check};
@@ -20,11 +20,11 @@ use supple_core::nalgebra::Rotation3;
 use supple_core::target::{PoseGains, PoseReference, PoseTarget};
 use supple_core::{Arm, Matrix, Pose, Reference, Vector};
 
-/// A task in `D` directions for these tests: its reference is at rest at `at`, or accelerates there.
+/// A task in `D` directions for these tests, whose reference rests or accelerates at `at`.
 trait Tip<const D: usize> {
     fn target(&self) -> impl Target<D>;
     fn task<const N: usize>(terms: &Terms<N>) -> Task<N, D>;
-    /// Stored by the spring \[J\].
+    /// Energy of the spring \[J\].
     fn energy_j(&self, tip: &Pose) -> f64;
     /// Diagonal that the law adds to the mobility `a` where the smallest singular value of the position's Jacobian is
     /// `sigma_m`.
@@ -131,7 +131,7 @@ impl Tip<6> for Placed {
     }
 }
 
-/// A reference away from the tip, as far as the case's accelerations say.
+/// A reference at a distance from the tip that is derived from the case's accelerations.
 fn away<const N: usize>(case: &Case<N>, tip: &Pose) -> Pose {
     let by = Vector3::new(case.qdd[0], case.qdd[1], case.qdd[2]);
     Pose {
@@ -216,7 +216,7 @@ fn at_singular_pose<const N: usize>(case: &Case<N>, directions: usize) -> Option
     None
 }
 
-/// The power of stiffness and damping is what the spring loses, minus what the damper dissipates.
+/// The power of stiffness and damping is the power that the spring loses, minus the power that the damper dissipates.
 fn exchanges_stored_energy<P: Tip<D>, const N: usize, const D: usize>(
     arm: &Arm<N>,
     tip: &P,
@@ -239,7 +239,7 @@ fn exchanges_stored_energy<P: Tip<D>, const N: usize, const D: usize>(
     Ok(())
 }
 
-/// The inertial terms are a force on the tip through the damped mobility, so that a lost direction gets no power.
+/// The inertial terms are a force on the tip through the damped mobility, so that a singular direction gets no power.
 fn inertial_terms_are_a_bounded_force<P: Tip<D>, const N: usize, const D: usize>(
     arm: &Arm<N>,
     tip: &P,
@@ -279,8 +279,8 @@ fn inertial_terms_are_a_bounded_force<P: Tip<D>, const N: usize, const D: usize>
     Ok(())
 }
 
-/// In the null space damping only takes energy, a torque has the power that it has on the joints' motion there, and
-/// neither is magnified. Where nothing is damped, neither has power on the task's motion.
+/// In the null space damping only removes energy, a torque has its power on the null-space motion of the joints, and
+/// neither is amplified. If no direction is damped, neither has power on the task's motion.
 fn nullspace_torque_is_bounded<P: Tip<D>, const N: usize, const D: usize>(
     arm: &Arm<N>,
     tip: &P,
@@ -431,13 +431,13 @@ fn singular_poses_of_the_wam() {
     });
 }
 
-/// What a simulated run did.
+/// Results of a simulated run.
 struct Run<const N: usize> {
-    /// Kinetic energy of the arm and energy of the spring, at the start, at most and at the end \[J\].
+    /// Kinetic energy of the arm and energy of the spring: initial, maximum and final \[J\].
     start_j: f64,
     max_j: f64,
     end_j: f64,
-    /// Smallest singular value of the position's Jacobian on the way \[m\].
+    /// Smallest singular value of the position's Jacobian during the run \[m\].
     min_sigma_m: f64,
     /// Whether the inverse was damped in some cycle.
     damped: bool,
@@ -481,8 +481,8 @@ fn simulate<P: Tip<D>, const N: usize, const D: usize>(
 }
 
 impl<const N: usize> Run<N> {
-    /// The terms that cancel the arm's own velocity products add energy while the tip moves towards poses in which it
-    /// is heavier; damping takes it again.
+    /// The terms that cancel the arm's own velocity products add energy while the tip moves towards poses with a greater
+    /// effective mass; damping removes this energy again.
     #[track_caller]
     fn is_bounded(&self) {
         let Run {

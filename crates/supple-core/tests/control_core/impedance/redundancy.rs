@@ -50,16 +50,16 @@ fn tip_feels_nothing<const N: usize>(arm: Arm<N>, roles: [Role; N]) {
 }
 
 #[test]
-fn nullspace_damping_of_4_joints_leaves_the_tip_alone() {
+fn nullspace_damping_of_4_joints_does_not_accelerate_the_tip() {
     tip_feels_nothing(wam4(), [Role::Active; 4]);
 }
 
 #[test]
-fn nullspace_damping_before_a_held_wrist_leaves_the_tip_alone() {
+fn nullspace_damping_before_a_held_wrist_does_not_accelerate_the_tip() {
     tip_feels_nothing(wam7(), seven().roles);
 }
 
-/// In terms of the law: `J H^-1 tau = 0`.
+/// The null-space torque satisfies `J H^-1 tau = 0`.
 #[test]
 fn nullspace_torque_does_not_accelerate_the_tip() {
     let (arm, roles) = (wam4(), [Role::Active; 4]);
@@ -75,7 +75,7 @@ fn nullspace_torque_does_not_accelerate_the_tip() {
     });
 }
 
-/// For any motion, also near singular poses, the damping only takes energy.
+/// For any motion, also near singular poses, the damping only removes energy.
 fn only_takes_energy<const N: usize>(arm: Arm<N>, roles: [Role; N]) {
     check(1000, scene::<N>(), |scene| -> Outcome {
         let power = nullspace(&scene, &arm, &roles).dot(&scene.qd);
@@ -85,12 +85,12 @@ fn only_takes_energy<const N: usize>(arm: Arm<N>, roles: [Role; N]) {
 }
 
 #[test]
-fn damping_of_4_joints_only_takes_energy() {
+fn damping_of_4_joints_only_removes_energy() {
     only_takes_energy(wam4(), [Role::Active; 4]);
 }
 
 #[test]
-fn damping_of_4_joints_before_a_held_wrist_only_takes_energy() {
+fn damping_of_4_joints_before_a_held_wrist_only_removes_energy() {
     only_takes_energy(wam7(), seven().roles);
 }
 

@@ -37,7 +37,7 @@ fn damping_is_a_smooth_function_of_the_min_singular_value() {
 }
 
 #[test]
-fn no_damping_on_the_papers_sinusoid() {
+fn the_papers_sinusoid_needs_no_singularity_damping() {
     let config = four();
     for k in 0..=100 {
         let x = 0.4 + 0.4 * f64::from(k) / 100.0;
@@ -196,7 +196,7 @@ fn still(q: Vector<3>) -> Scene<3> {
 }
 
 #[test]
-fn a_lost_direction_gets_the_max_task_mass() {
+fn a_singular_direction_gets_the_max_task_mass() {
     let arm = wam3();
     for pitch in [-1.0, 0.3, 0.8, 1.4] {
         let mass = commanded_mass(&still(Vector::<3>::new(0.4, pitch, 0.0)), &arm);

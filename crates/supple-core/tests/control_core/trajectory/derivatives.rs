@@ -5,7 +5,7 @@ use crate::support::property::{Outcome, check, vector3};
 use proptest::prelude::*;
 use supple_core::Trajectory;
 use supple_core::math::Vector3;
-use supple_core::trajectory::{Arc, Line, Piece, Probe, Quadrant, Sinusoid};
+use supple_core::trajectory::{Arc, Line, PathSegment, Probe, Quadrant, Sinusoid};
 
 /// A trajectory, a time on it, and the scales of its derivatives.
 #[derive(Clone, Debug)]
@@ -68,7 +68,7 @@ fn arc() -> impl Strategy<Value = Walk> {
     )
 }
 
-/// Any plane, any unequal semi-axes.
+/// A quadrant in any plane with any unequal semi-axes.
 pub fn quadrant() -> impl Strategy<Value = Quadrant> {
     let semi_axes = (vector3(1.0), vector3(1.0), 0.05..0.4, 0.05..0.4)
         .prop_filter("two directions", |(a, b, ..)| {
@@ -83,7 +83,7 @@ pub fn quadrant() -> impl Strategy<Value = Quadrant> {
     )
 }
 
-/// With corners at which the velocity jumps, and with ramps up to as long as the shortest piece allows.
+/// Quadrants with corners at which the velocity jumps, and with ramps up to the maximum length for the shortest segment.
 fn quadrant_walk() -> impl Strategy<Value = Walk> {
     let corner = prop_oneof![Just(0.0), 0.05..1.0];
     (quadrant(), 0.0..2.5, corner).prop_map(|(quadrant, rounds, corner)| {
@@ -96,7 +96,7 @@ fn quadrant_walk() -> impl Strategy<Value = Walk> {
         if corner_ramp_s > 0.0 {
             tau_s = tau_s.min(0.3 * corner_ramp_s);
         }
-        // The ramp ends within a second: it is short compared with the pieces, or they are short
+        // The ramp ends within a second: it is short compared with the segments, or the segments are short
         // compared with it.
         Walk {
             trajectory: Trajectory::Quadrant(quadrant),
@@ -107,7 +107,7 @@ fn quadrant_walk() -> impl Strategy<Value = Walk> {
     })
 }
 
-/// Any probing cycle that is valid.
+/// Any valid probing cycle.
 pub fn probe() -> impl Strategy<Value = Probe> {
     let place = (0.3..0.6, -0.3..0.3, -3.0..3.0);
     let shape = (1_u32..5, 0.002..0.05, 0.02..0.2, -0.4..0.4);
@@ -148,8 +148,8 @@ fn at_corner(walk: &Walk, h: f64) -> bool {
     let Trajectory::Quadrant(quadrant) = walk.trajectory else {
         return false;
     };
-    let piece = |t: f64| -> Piece { quadrant.piece_at(t).0 };
-    piece(walk.time_s - h) != piece(walk.time_s + h)
+    let segment = |t: f64| -> PathSegment { quadrant.segment_at(t).0 };
+    segment(walk.time_s - h) != segment(walk.time_s + h)
 }
 
 fn derivatives(walk: Walk) -> Outcome {

@@ -55,7 +55,7 @@ fn the_papers_sinusoid_at_any_speed() {
 }
 
 #[test]
-fn arc_keeps_radius_and_height_and_swings_about_its_centre() {
+fn an_arc_keeps_radius_and_height_and_oscillates_about_its_centre() {
     let arc = Arc {
         radius_m: 0.6,
         height_m: 0.1,

@@ -1,4 +1,4 @@
-//! The probing cycle: down, up, out, and a base that advances.
+//! The probing cycle: down, up, out, and a step of the base joint.
 
 use super::derivatives::probe;
 use crate::support::property::{Outcome, check};
@@ -61,7 +61,7 @@ fn changes(probe: &Probe) -> Vec<(f64, ProbePhase, u32, u32)> {
 }
 
 #[test]
-fn down_10_cm_up_10_cm_out_6_67_mm_and_on_to_the_next_column() {
+fn the_probing_cycle_moves_down_10_cm_up_10_cm_out_6_67_mm_and_to_the_next_column() {
     let probe = paper();
     let trajectory = Trajectory::Probe(probe);
     let mut expected = Vec::new();

@@ -1,11 +1,11 @@
-//! The quadrant: constant speed on every piece, and corners where only the velocity jumps.
+//! The quadrant: constant speed on every segment, and corners where only the velocity jumps.
 
 use super::derivatives::quadrant;
 use crate::support::property::{Outcome, check};
 use proptest::prelude::*;
 use supple_core::Trajectory;
 use supple_core::math::Vector3;
-use supple_core::trajectory::{Piece, Quadrant};
+use supple_core::trajectory::{PathSegment, Quadrant};
 
 /// Time after which the ramp of every quadrant here has ended.
 const AFTER_RAMP_S: f64 = 1.0;
@@ -31,31 +31,31 @@ struct Case {
 }
 
 fn case() -> impl Strategy<Value = Case> {
-    (quadrant(), 0.0..2.0).prop_map(|(quadrant, rounds)| {
-        let corner = |piece| {
-            let time_s = start_of(&quadrant, piece);
+    (quadrant(), 0.0..2.0).prop_map(|(quadrant, laps)| {
+        let corner = |segment| {
+            let time_s = start_of(&quadrant, segment);
             Trajectory::Quadrant(quadrant).at(time_s).position
         };
         let centre = Trajectory::Quadrant(quadrant).at(0.0).position;
-        let time_s = AFTER_RAMP_S + rounds * quadrant.period_s();
+        let time_s = AFTER_RAMP_S + laps * quadrant.period_s();
         Case {
             quadrant,
             time_s,
-            first: corner(Piece::Ellipse) - centre,
-            second: corner(Piece::Back) - centre,
+            first: corner(PathSegment::Ellipse) - centre,
+            second: corner(PathSegment::Back) - centre,
             centre,
             speed: Trajectory::Quadrant(quadrant).at(time_s).velocity.norm(),
         }
     })
 }
 
-/// First representable time at which `piece` has begun in the second round.
-fn start_of(quadrant: &Quadrant, piece: Piece) -> f64 {
+/// First representable time at which `segment` has begun in the second lap.
+fn start_of(quadrant: &Quadrant, segment: PathSegment) -> f64 {
     let period_s = quadrant.period_s();
     let begun = |t: f64| {
-        let (now, _, round) = quadrant.piece_at(t);
-        let rank = |p: Piece| p as u32;
-        (round, rank(now)) >= (u32::from(round_of(quadrant)), rank(piece))
+        let (now, _, lap) = quadrant.segment_at(t);
+        let rank = |p: PathSegment| p as u32;
+        (lap, rank(now)) >= (u32::from(first_lap_after_ramp(quadrant)), rank(segment))
     };
     let (mut before, mut after) = (0.0, AFTER_RAMP_S + 20.0 * period_s);
     for _ in 0..200 {
@@ -69,10 +69,10 @@ fn start_of(quadrant: &Quadrant, piece: Piece) -> f64 {
     after
 }
 
-/// The first round after the ramp.
-fn round_of(quadrant: &Quadrant) -> u8 {
-    let (_, _, round) = quadrant.piece_at(AFTER_RAMP_S);
-    u8::try_from(round + 1).expect("few rounds in a second")
+/// The first lap after the ramp.
+fn first_lap_after_ramp(quadrant: &Quadrant) -> u8 {
+    let (_, _, lap) = quadrant.segment_at(AFTER_RAMP_S);
+    u8::try_from(lap + 1).expect("few laps in a second")
 }
 
 fn speed_is_constant(case: Case) -> Outcome {
@@ -88,7 +88,7 @@ fn speed_is_constant(case: Case) -> Outcome {
 
 fn points_lie_on_the_path(case: Case) -> Outcome {
     let reference = Trajectory::Quadrant(case.quadrant).at(case.time_s);
-    let (piece, share, _) = case.quadrant.piece_at(case.time_s);
+    let (segment, share, _) = case.quadrant.segment_at(case.time_s);
     prop_assert!((0.0..=1.0 + 1e-12).contains(&share));
     let (a, b) = (case.first.norm(), case.second.norm());
     let from_centre = reference.position - case.centre;
@@ -98,16 +98,16 @@ fn points_lie_on_the_path(case: Case) -> Outcome {
     );
     let off_plane = from_centre - case.first * (x / a) - case.second * (y / b);
     prop_assert!(off_plane.norm() < 1e-12);
-    match piece {
-        Piece::Out => {
+    match segment {
+        PathSegment::Out => {
             prop_assert!(y.abs() < 1e-12 && (x - share * a).abs() < 1e-12);
             prop_assert_eq!(reference.acceleration, Vector3::zeros());
         }
-        Piece::Back => {
+        PathSegment::Back => {
             prop_assert!(x.abs() < 1e-12 && (y - (1.0 - share) * b).abs() < 1e-12);
             prop_assert_eq!(reference.acceleration, Vector3::zeros());
         }
-        Piece::Ellipse => {
+        PathSegment::Ellipse => {
             let on = (x / a).powi(2) + (y / b).powi(2);
             prop_assert!((on - 1.0).abs() < 1e-11 && x > -1e-12 && y > -1e-12);
             // Curvature of an ellipse at (x, y), towards the inside.
@@ -134,8 +134,8 @@ fn lengths(case: Case) -> Outcome {
 fn closes_on_itself(case: Case) -> Outcome {
     let trajectory = Trajectory::Quadrant(case.quadrant);
     let now = trajectory.at(case.time_s);
-    // Away from the corners, where a rounding error of time decides the piece.
-    let (_, share, _) = case.quadrant.piece_at(case.time_s);
+    // Away from the corners, where a rounding error of time decides the segment.
+    let (_, share, _) = case.quadrant.segment_at(case.time_s);
     let later = trajectory.at(case.time_s + case.quadrant.period_s());
     prop_assert!((later.position - now.position).norm() < 1e-11);
     if (1e-6..1.0 - 1e-6).contains(&share) {
@@ -147,12 +147,12 @@ fn closes_on_itself(case: Case) -> Outcome {
 fn corners_jump_in_velocity_alone(case: Case) -> Outcome {
     let trajectory = Trajectory::Quadrant(case.quadrant);
     let (first, second) = (case.first.normalize(), case.second.normalize());
-    for (piece, before, after) in [
-        (Piece::Out, -second, first),
-        (Piece::Ellipse, first, second),
-        (Piece::Back, -first, -second),
+    for (segment, before, after) in [
+        (PathSegment::Out, -second, first),
+        (PathSegment::Ellipse, first, second),
+        (PathSegment::Back, -first, -second),
     ] {
-        let time_s = start_of(&case.quadrant, piece);
+        let time_s = start_of(&case.quadrant, segment);
         let (left, right) = (trajectory.at(time_s - 1e-9), trajectory.at(time_s + 1e-9));
         prop_assert!((right.position - left.position).norm() < 1e-8);
         prop_assert!((left.velocity - before * case.speed).norm() < 1e-6 * case.speed);
@@ -201,12 +201,12 @@ fn the_ramp_reaches_the_speed_and_adds_half_its_time() {
     assert!((last - 0.1).abs() < 1e-15);
     let covered = (at(0.5).position - at(0.0).position).norm();
     assert!((covered - 0.1 * 0.25).abs() < 1e-14);
-    let round = at(0.25 + quadrant.period_s());
-    assert!((round.position - at(0.0).position).norm() < 1e-12);
+    let lap = at(0.25 + quadrant.period_s());
+    assert!((lap.position - at(0.0).position).norm() < 1e-12);
 }
 
 /// With corner ramps the velocity is continuous everywhere and zero at the corners, the same path is followed, and
-/// a round takes three ramps longer.
+/// a lap takes three ramps longer.
 #[test]
 fn corner_ramps_leave_the_path_and_stop_at_its_corners() {
     check(
@@ -222,15 +222,15 @@ fn corner_ramps_leave_the_path_and_stop_at_its_corners() {
                     < 1e-12 * with.period_s()
             );
             let (_, max_acceleration) = Trajectory::Quadrant(with).peaks();
-            for piece in [Piece::Out, Piece::Ellipse, Piece::Back] {
-                let start_s = start_of(&with, piece);
+            for segment in [PathSegment::Out, PathSegment::Ellipse, PathSegment::Back] {
+                let start_s = start_of(&with, segment);
                 let trajectory = Trajectory::Quadrant(with);
                 for beside_s in [-1e-6 * ramp_s, 1e-6 * ramp_s] {
                     let velocity = trajectory.at(start_s + beside_s).velocity;
                     prop_assert!(velocity.norm() < 1e-9 * speed);
                 }
                 let corner_m = Trajectory::Quadrant(without)
-                    .at(start_of(&without, piece))
+                    .at(start_of(&without, segment))
                     .position;
                 prop_assert!((trajectory.at(start_s).position - corner_m).norm() < 1e-8);
                 let middle = trajectory.at(start_s + 0.5 * ramp_s);

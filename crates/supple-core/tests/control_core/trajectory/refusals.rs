@@ -172,7 +172,7 @@ fn degenerate_quadrants_are_rejected() {
         let quadrant = Quadrant::new(zero, x, z, 0.1, 0.1);
         Trajectory::Quadrant(quadrant.with_corner_ramp(corner_ramp_s))
     };
-    // The shortest piece takes one second at full speed.
+    // The shortest segment takes one second at full speed.
     assert!(with_corners(1.0).validate().is_ok());
     for value in [-0.1, 1.001, f64::NAN, f64::INFINITY] {
         refused(with_corners(value), "corner_ramp_s", value);

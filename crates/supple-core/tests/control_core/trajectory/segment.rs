@@ -1,4 +1,4 @@
-//! The piece between two set-points: its ends, its derivatives, its stop, and what a sequence of pieces adds up to.
+//! The segment between two set-points: its ends, its derivatives, its stop, and the path of a sequence of segments.
 
 use proptest::prelude::*;
 use supple_core::Trajectory;
@@ -48,7 +48,7 @@ proptest! {
         let segment = Segment::new(from, at_s, to, length_s, MAX_ACCELERATION);
         prop_assert!(differ(&segment.at(at_s), &from) < 1e-9);
         prop_assert!(differ(&segment.at(at_s - 1.0), &from) < 1e-9);
-        // Rounding of the time is multiplied by the jerk there, which is up to 60 m / (0.01 s)^3.
+        // The rounding error of the time is multiplied by the jerk, which is up to 60 m / (0.01 s)^3.
         prop_assert!(differ(&segment.at(at_s + length_s), &to) < 1e-6);
         let end = Reference::at_rest(segment.rest_m());
         for later_s in [0.0, 1e-3, 10.0] {
@@ -69,7 +69,7 @@ proptest! {
         let velocity = (after.position - before.position) / (2.0 * h);
         prop_assert!((velocity - now.velocity).norm() < 1e-5 * scale);
         let acceleration = (after.velocity - before.velocity) / (2.0 * h);
-        // At its two joints the jerk jumps; there the difference sees both sides.
+        // The jerk jumps at two times; the difference across such a time uses both sides.
         prop_assert!((acceleration - now.acceleration).norm() < 2e-3 * scale);
     }
 
@@ -95,7 +95,7 @@ proptest! {
     }
 }
 
-/// Set-points at 100 Hz, each 30 ms ahead, of the paper's sinusoid: greatest distance from it after the first 50 ms.
+/// Greatest distance from the paper's sinusoid after the first 50 ms, with set-points of it at 100 Hz, each 30 ms ahead.
 fn streamed(of: impl Fn(&Trajectory, f64) -> Reference) -> f64 {
     let sinusoid = Trajectory::Sinusoid(Sinusoid::paper(1.0));
     let mut segment = Segment::new(
@@ -125,7 +125,7 @@ fn streamed(of: impl Fn(&Trajectory, f64) -> Reference) -> f64 {
 fn a_sequence_reproduces_the_curve_that_it_samples() {
     let with_derivatives = streamed(|sinusoid, time_s| sinusoid.at(time_s));
     assert!(with_derivatives < 1e-6, "{with_derivatives} m");
-    // Positions alone: the velocity from three of them, no acceleration.
+    // The set-points have positions alone: their velocity is derived from three positions, their acceleration is zero.
     let positions = streamed(|sinusoid, time_s| {
         let at = |steps: f64| sinusoid.at(time_s - 0.01 * steps).position;
         Reference {

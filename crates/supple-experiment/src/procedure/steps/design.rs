@@ -1,79 +1,82 @@
 //! The motions, and the space that they sweep.
 
-use super::{FLOAT_S, GAINS_S, REST_S, RETURN_S, Run, Stage, config};
+use super::{FLOAT_S, GAINS_S, ModelStage, REST_S, RETURN_S, Run, config};
 use crate::excite::move_to;
 use crate::procedure::arm::MotionArm;
 use crate::procedure::error::ProcedureError;
-use crate::procedure::motions::{DesignPlan, Detour, Motions, follow, gains_along, ramps_s};
+use crate::procedure::motions::{DesignPlan, Motions, ViaPose, follow, gains_along, ramps_s};
 use crate::procedure::progress::{StepName, write_whole};
 use crate::procedure::sweep::Sweep;
 use crate::procedure::{DRAWING, LEARNING_S};
 use supple_core::Config;
 
 impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
-    /// Whether the arm falls without torque: its motors may give less torque than is commanded, and gravity may need
+    /// Returns whether the arm falls without torque: its motors may give less torque than is commanded, and gravity may need
     /// much of their limits.
-    pub(super) fn falls(&self) -> bool {
+    pub(super) fn falls_without_torque(&self) -> bool {
         self.start.falls_without_torque()
     }
 
-    /// The pose through which heavy moves go, if the arm falls without torque.
-    pub(super) fn detour(&self, stage: Stage) -> Result<Option<Detour<N>>, ProcedureError> {
+    /// Returns the via pose of moves that need much torque, if the arm falls without torque.
+    pub(super) fn via_pose(&self, stage: ModelStage) -> Result<Option<ViaPose<N>>, ProcedureError> {
         let Some(light_rad) = self.light_rad else {
             return Ok(None);
         };
         let config = config::<N>(&self.model(stage)?)?;
-        Ok(Some(Detour { config, light_rad }))
+        Ok(Some(ViaPose { config, light_rad }))
     }
 
     /// Designs the motions with the model of a stage.
-    pub(super) fn design(&mut self, stage: Stage) -> Result<Motions<N>, A::Error> {
-        self.say("design of the excitation");
+    pub(super) fn design(&mut self, stage: ModelStage) -> Result<Motions<N>, A::Error> {
+        self.report("design of the excitation");
         let home_rad = self.home_rad;
         let config = config::<N>(&self.model(stage)?)?;
-        let unknown = stage == Stage::Start || self.progress.first_fit.is_none();
+        let unknown = stage == ModelStage::Start || self.progress.first_fit.is_none();
         let plan = DesignPlan {
             seed: self.options.seed,
             candidates: self.options.candidates,
-            about_light_pose: self.falls(),
-            careful: self.falls() && unknown,
+            about_light_pose: self.falls_without_torque(),
+            careful: self.falls_without_torque() && unknown,
         };
         let work = move || Motions::design(&config, &home_rad, &plan);
         let designed = self.arm.meanwhile(work)?;
         let designed = designed.map_err(ProcedureError::from)?;
-        self.light_rad = self.falls().then_some(designed.light_rad);
+        self.light_rad = self.falls_without_torque().then_some(designed.light_rad);
         Ok(designed)
     }
 
-    /// The remaining motions within the torque limits by the model of the first fit, if the arm falls without torque. A
-    /// space that they sweep beyond what was confirmed is confirmed anew.
+    /// If the arm falls without torque, designs the remaining motions within the torque limits with the model of the first fit.
+    /// If these motions leave the confirmed space, the operator must confirm the new space.
     pub(super) fn redesign(&mut self, motions: Motions<N>) -> Result<Motions<N>, A::Error> {
-        if !self.falls() || self.progress.finished(StepName::ValidationMotion).is_some() {
+        if !self.falls_without_torque()
+            || self.progress.finished(StepName::ValidationMotion).is_some()
+        {
             return Ok(motions);
         }
-        let motions = self.design(Stage::First)?;
-        let config = config::<N>(&self.model(Stage::First)?)?;
+        let motions = self.design(ModelStage::First)?;
+        let config = config::<N>(&self.model(ModelStage::First)?)?;
         let sweep = Sweep::of(&config, &self.home_rad, &motions.all());
         let confirmed = self.progress.sweep.as_ref();
         if confirmed.is_none_or(|confirmed| !confirmed.contains(&sweep)) {
-            self.say("by the model of the first pass the arm sweeps another space");
-            self.ask(&sweep)?;
+            self.report("by the model of the first pass the arm sweeps another space");
+            self.confirm_sweep(&sweep)?;
         }
-        // A first pass has little information on the inertias: the loops must be stable with those of the given model, too.
+        // The first pass contains little information about the inertias, so the loops must also be stable with the inertias of
+        // the given model.
         let given = self
-            .model(Stage::Start)?
+            .model(ModelStage::Start)?
             .config::<N>()
             .map_err(ProcedureError::from)?;
         self.first_gains = Some(gains_along(&given, &motions.all()).map_err(ProcedureError::from)?);
         Ok(motions)
     }
 
-    /// Asks whether the arm may sweep a space.
-    pub(super) fn ask(&mut self, sweep: &Sweep) -> Result<(), ProcedureError> {
+    /// Asks the operator whether the arm may sweep a space.
+    pub(super) fn confirm_sweep(&mut self, sweep: &Sweep) -> Result<(), ProcedureError> {
         let drawing = self.options.out.join(DRAWING);
         write_whole(&drawing, sweep.svg().as_bytes())?;
         let text = format!("the arm sweeps {}: {}", sweep.text(), drawing.display());
-        self.say(&text);
+        self.report(&text);
         let confirmed = self.operator.confirms(sweep, &drawing);
         self.progress.sweep = Some(sweep.clone());
         self.progress.write(&self.options.out)?;
@@ -94,12 +97,12 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         let stated_s = self.stated_s(config, motions);
         self.progress.stated_s = stated_s;
         let text = format!("about {:.1} minutes of motion follow", stated_s / 60.0);
-        self.say(&text);
-        self.ask(&Sweep::of(config, &self.home_rad, &motions.all()))?;
+        self.report(&text);
+        self.confirm_sweep(&Sweep::of(config, &self.home_rad, &motions.all()))?;
         Ok(self.finish(StepName::Confirmed, self.progress.moved_s, None)?)
     }
 
-    /// Time of all motion, about \[s\].
+    /// Returns the approximate time of all motion \[s\].
     pub(super) fn stated_s(&self, config: &Config<N>, motions: &Motions<N>) -> f64 {
         let all: f64 = follow(config, &self.home_rad, &motions.all(), None)
             .iter()

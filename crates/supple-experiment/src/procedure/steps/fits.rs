@@ -1,6 +1,6 @@
-//! The fits.
+//! The steps that fit models.
 
-use super::{Run, Stage};
+use super::{ModelStage, Run};
 use crate::procedure::arm::MotionArm;
 use crate::procedure::error::ProcedureError;
 use crate::procedure::progress::{FitQuality, StepName};
@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use supple_ident::Log;
 
 impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
-    /// The log of a finished step.
+    /// Returns the path of the log of a finished step.
     pub(super) fn log_file(&self, step: StepName) -> PathBuf {
         let finished = self.progress.finished(step);
         let name = finished.and_then(|finished| finished.log.as_deref());
@@ -21,10 +21,10 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         if self.is_done(StepName::FirstFit, "first fit") {
             return Ok(());
         }
-        let model = self.model(Stage::Start)?;
+        let model = self.model(ModelStage::Start)?;
         let scaled = fitting::scale_dry_friction::<N>(&model, &self.progress.breakaway)?;
         let pass = self.log_file(StepName::FirstPass);
-        // The moves from the home pose reach where the pass does not.
+        // The moves from the home pose reach poses outside of the pass.
         let logs = self.options.out.join(LOGS);
         let moves =
             ["warm-up", "breakaway-0-positive"].map(|name| logs.join(format!("{name}.mcap")));
@@ -34,7 +34,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             for file in moves.iter().filter(|file| file.exists()) {
                 others.extend(fitting::read_position_controlled_motions::<N>(file)?);
             }
-            let pass = only(&fitting::read_excitations::<N>(&pass)?, "first-pass")?.clone();
+            let pass = single_log(&fitting::read_excitations::<N>(&pass)?, "first-pass")?.clone();
             fitting::fit_first::<N>(&of, &pass, &others)
         })??;
         let (found, quality) = match fit {
@@ -42,12 +42,12 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             None => (scaled, None),
         };
         match &quality {
-            Some(quality) => self.say(&format!(
+            Some(quality) => self.report(&format!(
                 "end of the first pass, which was not fitted: {:.1} % of the torque unexplained, {:.1} % before",
                 100.0 * quality.validation_relative,
                 100.0 * quality.validation_relative_before
             )),
-            None => self.say("the first fit is no better than the model before it, or no controller starts with it: that model stays"),
+            None => self.report("the first fit is no better than the model before it, or no controller starts with it: that model stays"),
         }
         let folder = self.options.out.join(FIRST_MODEL);
         found.save(&folder).map_err(ProcedureError::from)?;
@@ -59,13 +59,13 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         if self.is_done(StepName::Identification, "identification") {
             return Ok(());
         }
-        let model = self.model(Stage::First)?;
+        let model = self.model(ModelStage::First)?;
         let file = |step| self.log_file(step);
         let [full, slow] = [StepName::FullPass, StepName::SlowMotion].map(file);
         let [first, constant] = [StepName::FirstPass, StepName::ConstantSpeed].map(file);
         let validation = self.log_file(StepName::ValidationMotion);
         let start = self.start.clone();
-        // Reading takes as long as fitting; the arm's telemetry must be read meanwhile.
+        // Reading and fitting take long; the arm's telemetry must be read meanwhile.
         let (found, quality) = self.arm.meanwhile(move || {
             let (mut logs, mut others) = (Vec::new(), Vec::new());
             for file in [&full, &slow, &first] {
@@ -75,14 +75,14 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
                 others.extend(fitting::read_position_controlled_motions::<N>(file)?);
             }
             let constant = fitting::read_excitations::<N>(&constant)?;
-            let validation = only(
+            let validation = single_log(
                 &fitting::read_excitations::<N>(&validation)?,
                 "validation-motion",
             )?
             .clone();
             fitting::fit_all::<N>(&model, &start, &logs, &constant, &validation, &others)
         })??;
-        self.say(&summary(&quality));
+        self.report(&summary(&quality));
         let found = found
             .with_held_joints_of(self.start)
             .and_then(|found| found.with_stable_damping::<N>())
@@ -93,7 +93,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             .zip(shares)
         {
             if share < 1.0 {
-                self.say(&format!(
+                self.report(&format!(
                     "{gains}: reduced to {:.0} %, since the identified inertias and the delay of the loop allow no more",
                     100.0 * share
                 ));
@@ -107,7 +107,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
     }
 }
 
-fn only<'a>(logs: &'a [Log], name: &str) -> Result<&'a Log, ProcedureError> {
+fn single_log<'a>(logs: &'a [Log], name: &str) -> Result<&'a Log, ProcedureError> {
     logs.first().ok_or_else(|| ProcedureError::Stopped {
         motion: name.to_owned(),
         fault: "its log has no motion along a series".to_owned(),

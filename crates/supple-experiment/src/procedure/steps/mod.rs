@@ -1,4 +1,4 @@
-//! The steps, one after the other.
+//! The steps of a calibration, in order.
 
 mod design;
 mod fits;
@@ -18,7 +18,7 @@ use supple_core::config::JointGains;
 use supple_core::{Config, Vector};
 use supple_model::Description;
 
-/// Rest in which the torque at a standstill is measured \[s\].
+/// Duration of the rest in which the holding torque is measured \[s\].
 const REST_S: f64 = 1.0;
 /// Duration of float \[s\].
 const FLOAT_S: f64 = 2.0;
@@ -26,15 +26,15 @@ const FLOAT_S: f64 = 2.0;
 const GAINS_S: f64 = 0.2;
 /// Duration of the move back to the start of the sinusoid \[s\].
 const RETURN_S: f64 = 1.5;
-/// Attempts at a motion that contact stops.
+/// Maximum number of attempts at a motion that contact stops.
 const ATTEMPTS: usize = 3;
 
-/// What the calibration found.
+/// Result of a calibration.
 #[derive(Clone, Debug)]
 pub struct CalibratedArm {
     /// The identified arm, with the held joints of the description.
     pub description: Description,
-    /// All that was measured on the way.
+    /// All measured values.
     pub progress: Progress,
 }
 
@@ -42,7 +42,7 @@ pub struct CalibratedArm {
 /// the drawing of the swept space, the model of the first pass and one log for each motion.
 ///
 /// # Errors
-/// [`ProcedureError`] with the remedy, and the errors of the arm. What is finished stays finished.
+/// [`ProcedureError`] with the remedy, and the errors of the arm. Finished steps stay recorded.
 pub fn calibrate_arm<const N: usize, A: MotionArm<N>>(
     arm: &mut A,
     start: &Description,
@@ -53,9 +53,9 @@ pub fn calibrate_arm<const N: usize, A: MotionArm<N>>(
     run.all()
 }
 
-/// Model in the controller.
+/// Stage of the calibration that determines the model in the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
+enum ModelStage {
     Start,
     First,
     Identified,
@@ -69,17 +69,17 @@ struct Run<'a, const N: usize, A> {
     progress: Progress,
     names: Vec<String>,
     home_rad: Vector<N>,
-    /// The given arm with its limits, which no stage changes: it times the moves.
+    /// Configuration of the given arm, whose limits determine the durations of moves in all stages.
     limits: Config<N>,
-    loaded: Option<Stage>,
-    /// Pose in which gravity needs little torque, of an arm that falls without torque.
+    loaded: Option<ModelStage>,
+    /// For an arm that falls without torque: a pose in which gravity needs little torque.
     light_rad: Option<Vector<N>>,
-    /// Gains of the move mode with the model of the first pass; `None`: those of the description.
+    /// Gains of the move mode with the model of the first pass; `None`: the gains of the description.
     first_gains: Option<JointGains<N>>,
 }
 
 /// A motion that was completed.
-struct Done {
+struct CompletedMotion {
     motions: Vec<Motion>,
     log: String,
     contacts: Vec<String>,
@@ -118,7 +118,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
     fn all(mut self) -> Result<CalibratedArm, A::Error> {
         self.perform()?;
         let description = match self.progress.finished(StepName::Identification) {
-            Some(_) => self.model(Stage::Identified)?,
+            Some(_) => self.model(ModelStage::Identified)?,
             None => self.start.clone(),
         };
         Ok(CalibratedArm {
@@ -127,7 +127,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         })
     }
 
-    /// Whether the last wanted step is finished.
+    /// Returns whether the last requested step is finished.
     fn is_over(&self) -> bool {
         let until = self.options.until;
         until.is_some_and(|step| self.progress.finished(step).is_some())
@@ -138,8 +138,8 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         if self.is_over() {
             return Ok(());
         }
-        let config = config::<N>(&self.model(Stage::Start)?)?;
-        let motions = self.design(Stage::Start)?;
+        let config = config::<N>(&self.model(ModelStage::Start)?)?;
+        let motions = self.design(ModelStage::Start)?;
         self.confirm(&config, &motions)?;
         if self.is_over() {
             return Ok(());
@@ -153,7 +153,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             return Ok(());
         }
         let first = [motions.first];
-        self.series(StepName::FirstPass, "first-pass", Stage::Start, &first)?;
+        self.series(StepName::FirstPass, "first-pass", ModelStage::Start, &first)?;
         if self.is_over() {
             return Ok(());
         }
@@ -172,7 +172,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
                 &[motions.validation],
             ),
         ] {
-            self.series(step, name, Stage::First, series)?;
+            self.series(step, name, ModelStage::First, series)?;
             if self.is_over() {
                 return Ok(());
             }
@@ -186,42 +186,42 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         Ok(())
     }
 
-    fn say(&mut self, text: &str) {
+    fn report(&mut self, text: &str) {
         self.operator.progress(text);
     }
 
-    /// The description that the controller uses in a stage. All joints move except for the last one, in which the held
-    /// joints of the description are held.
-    fn model(&self, stage: Stage) -> Result<Description, ProcedureError> {
+    /// Returns the description that the controller uses in a stage. In the last stage the held joints of the description are
+    /// held; in the other stages all joints move.
+    fn model(&self, stage: ModelStage) -> Result<Description, ProcedureError> {
         let load = |folder: PathBuf| Description::load(folder.join("arm.toml"));
         Ok(match stage {
-            Stage::Start => self.start.with_all_joints_active()?,
-            Stage::First => load(self.options.out.join(FIRST_MODEL))?,
-            Stage::Identified => load(self.options.out.clone())?,
+            ModelStage::Start => self.start.with_all_joints_active()?,
+            ModelStage::First => load(self.options.out.join(FIRST_MODEL))?,
+            ModelStage::Identified => load(self.options.out.clone())?,
         })
     }
 
-    /// Loads the model of a stage, in the home pose if the arm has moved.
-    fn ensure(&mut self, stage: Stage) -> Result<(), A::Error> {
+    /// Loads the model of a stage unless it is loaded. An arm that has moved moves to the home pose first.
+    fn ensure_model(&mut self, stage: ModelStage) -> Result<(), A::Error> {
         if self.loaded == Some(stage) {
             return Ok(());
         }
         if self.loaded.is_some() {
             self.home(&format!("home-before-{}", name_of(stage)))?;
         }
-        self.say(&format!(
+        self.report(&format!(
             "the controller starts with the {}",
             text_of(stage)
         ));
         let mut model = self.model(stage)?;
-        if stage != Stage::Identified {
-            let unknown = stage == Stage::Start || self.progress.first_fit.is_none();
+        if stage != ModelStage::Identified {
+            let unknown = stage == ModelStage::Start || self.progress.first_fit.is_none();
             let minimum = minimum_thresholds::<N>(&model, unknown)?;
             model = model
                 .with_minimum_thresholds(&minimum)
                 .map_err(ProcedureError::from)?;
         }
-        if let Some(gains) = self.first_gains.filter(|_| stage == Stage::First) {
+        if let Some(gains) = self.first_gains.filter(|_| stage == ModelStage::First) {
             model = model
                 .with_move_gains(&gains)
                 .map_err(ProcedureError::from)?;
@@ -232,17 +232,17 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
     }
 
     /// Moves to the home pose.
-    fn home(&mut self, name: &str) -> Result<Done, A::Error> {
+    fn home(&mut self, name: &str) -> Result<CompletedMotion, A::Error> {
         let (home_rad, limits) = (self.home_rad, self.limits);
         self.motion(name, &|from| vec![move_to(&limits, &home_rad, from)])
     }
 
-    /// Performs a motion that begins where the arm is. After a contact it is repeated.
+    /// Performs a motion that begins in the present pose, and repeats it after a contact.
     fn motion(
         &mut self,
         name: &str,
         steps: &dyn Fn(&Vector<N>) -> Vec<Step<N>>,
-    ) -> Result<Done, A::Error> {
+    ) -> Result<CompletedMotion, A::Error> {
         let mut contacts = Vec::new();
         loop {
             let log = match contacts.len() {
@@ -253,7 +253,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             let performed = self.arm.perform(&log, &steps(&from_rad))?;
             self.progress.moved_s += performed.moved_s;
             let Some(stopped) = performed.stopped else {
-                return Ok(Done {
+                return Ok(CompletedMotion {
                     motions: performed.motions,
                     log,
                     contacts,
@@ -263,7 +263,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             contacts.push(fault.clone());
             let remedy = match (stopped.cause, contacts.len() < ATTEMPTS) {
                 (StopCause::Contact, true) => {
-                    self.say(&format!(
+                    self.report(&format!(
                         "{name}: {fault}; the arm rests, then repeats the motion"
                     ));
                     self.arm.recover()?;
@@ -287,7 +287,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         &mut self,
         step: StepName,
         before_s: f64,
-        done: Option<Done>,
+        done: Option<CompletedMotion>,
     ) -> Result<(), ProcedureError> {
         let (log, contacts) = match done {
             Some(done) => (Some(done.log), done.contacts),
@@ -302,11 +302,11 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         self.progress.write(&self.options.out)
     }
 
-    /// Whether a step is finished; otherwise it is announced.
+    /// Returns whether a step is finished; if not, reports its beginning to the operator.
     fn is_done(&mut self, step: StepName, text: &str) -> bool {
         let done = self.progress.finished(step).is_some();
         if !done {
-            self.say(text);
+            self.report(text);
         }
         done
     }
@@ -316,18 +316,18 @@ fn config<const N: usize>(model: &Description) -> Result<Config<N>, ProcedureErr
     Ok(model.config::<N>()?)
 }
 
-fn name_of(stage: Stage) -> &'static str {
+fn name_of(stage: ModelStage) -> &'static str {
     match stage {
-        Stage::Start => "start",
-        Stage::First => "full-pass",
-        Stage::Identified => "float",
+        ModelStage::Start => "start",
+        ModelStage::First => "full-pass",
+        ModelStage::Identified => "float",
     }
 }
 
-fn text_of(stage: Stage) -> &'static str {
+fn text_of(stage: ModelStage) -> &'static str {
     match stage {
-        Stage::Start => "given model",
-        Stage::First => "model of the first pass",
-        Stage::Identified => "identified model",
+        ModelStage::Start => "given model",
+        ModelStage::First => "model of the first pass",
+        ModelStage::Identified => "identified model",
     }
 }

@@ -1,6 +1,6 @@
-//! Motion with the models before the identified one.
+//! The steps that move the arm with the given model and the model of the first pass.
 
-use super::{Run, Stage};
+use super::{ModelStage, Run};
 use crate::breakaway::{JointBreakaway, sliding_torque_nm};
 use crate::calibrate::upright;
 use crate::error::ExperimentError;
@@ -21,7 +21,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         let before_s = self.progress.moved_s;
         let mut done = None;
         if self.options.warm_up_s > 2.0 * motions.first.ramp_s {
-            self.ensure(Stage::Start)?;
+            self.ensure_model(ModelStage::Start)?;
             let series = Fourier {
                 duration_s: self.options.warm_up_s,
                 ..motions.first
@@ -42,8 +42,8 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             return Ok(());
         }
         let before_s = self.progress.moved_s;
-        self.ensure(Stage::Start)?;
-        let pose_rad = match self.falls() {
+        self.ensure_model(ModelStage::Start)?;
+        let pose_rad = match self.falls_without_torque() {
             true => motions.light_rad,
             false => upright(config),
         };
@@ -77,12 +77,12 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         Ok(self.finish(StepName::Breakaway, before_s, None)?)
     }
 
-    /// Follows series and keeps the log.
+    /// Performs the step that follows `series`, and records its log.
     pub(super) fn series(
         &mut self,
         step: StepName,
         name: &str,
-        stage: Stage,
+        stage: ModelStage,
         series: &[Fourier<N>],
     ) -> Result<(), A::Error> {
         let duration_s: f64 = series.iter().map(|series| series.duration_s).sum();
@@ -93,10 +93,10 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             return Ok(());
         }
         let before_s = self.progress.moved_s;
-        self.ensure(stage)?;
-        let detour = self.detour(stage)?;
+        self.ensure_model(stage)?;
+        let via_pose = self.via_pose(stage)?;
         let limits = self.limits;
-        let steps = |from: &Vector<N>| follow(&limits, from, series, detour.as_ref());
+        let steps = |from: &Vector<N>| follow(&limits, from, series, via_pose.as_ref());
         let done = self.motion(name, &steps)?;
         Ok(self.finish(step, before_s, Some(done))?)
     }

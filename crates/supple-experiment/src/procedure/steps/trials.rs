@@ -1,6 +1,6 @@
 //! Trials of the identified model: float and sinusoid.
 
-use super::{FLOAT_S, GAINS_S, RETURN_S, Run, Stage, config};
+use super::{FLOAT_S, GAINS_S, ModelStage, RETURN_S, Run, config};
 use crate::error::ExperimentError;
 use crate::excite::move_to;
 use crate::metrics::Rms;
@@ -20,7 +20,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             return Ok(());
         }
         let before_s = self.progress.moved_s;
-        self.ensure(Stage::Identified)?;
+        self.ensure_model(ModelStage::Identified)?;
         let float = Step {
             recorded: true,
             ..Step::wait(Request::Float, FLOAT_S)
@@ -39,9 +39,9 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
                     ranges.fold(0.0, f64::max)
                 });
             }
-            // A trial that fails does not cost the model.
+            // The identified model is kept if a trial fails.
             Some(stopped) => {
-                self.say(&format!("float ended by a fault: {}", stopped.fault));
+                self.report(&format!("float ended by a fault: {}", stopped.fault));
                 self.progress.float_ended = Some(stopped.fault);
                 self.arm.recover()?;
             }
@@ -49,9 +49,9 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         Ok(self.finish(StepName::Float, before_s, None)?)
     }
 
-    /// Start of the sinusoid; `None` if the arm cannot reach it.
+    /// Returns the start pose of the sinusoid; `None` if the arm cannot reach the sinusoid.
     pub(super) fn sinusoid_start(&self) -> Result<Option<Vector<N>>, ProcedureError> {
-        let config = config::<N>(&self.model(Stage::Identified)?)?;
+        let config = config::<N>(&self.model(ModelStage::Identified)?)?;
         let (trajectory, duration_s) = self.start.paths().sinusoid(1.0);
         match start_pose(&config, "sinusoid", &trajectory, duration_s) {
             Ok(start_rad) => Ok(Some(start_rad)),
@@ -66,10 +66,10 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         }
         let before_s = self.progress.moved_s;
         let Some(start_rad) = self.sinusoid_start()? else {
-            self.say("the arm cannot reach the sinusoid, which is left out");
+            self.report("the arm cannot reach the sinusoid, which is left out");
             return Ok(self.finish(StepName::Sinusoid, before_s, None)?);
         };
-        self.ensure(Stage::Identified)?;
+        self.ensure_model(ModelStage::Identified)?;
         let (trajectory, duration_s) = self.start.paths().sinusoid(1.0);
         let track = |duration_s| Step {
             recorded: true,
@@ -79,7 +79,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             gains: scenario::gains(scenario::STIFFNESS_N_PER_M),
             ramp_s: 0.5 * GAINS_S,
         };
-        let period_s = self.model(Stage::Identified)?.settings().period_s;
+        let period_s = self.model(ModelStage::Identified)?.settings().period_s;
         let mut result = SinusoidResult::default();
         for learning in [false, true] {
             let (name, lead_s) = match learning {
@@ -96,7 +96,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
                 steps.push(Step::wait(on, GAINS_S));
             }
             steps.push(track(lead_s + duration_s));
-            // The sinusoid goes on until something else is requested.
+            // The sinusoid continues until the next request.
             steps.push(Step::wait(
                 Request::Move {
                     target_rad: start_rad,

@@ -1,6 +1,6 @@
-//! Signs, order and torque of the joints.
+//! The step that checks signs, order and torque units of the joints.
 
-use super::{REST_S, Run, Stage, config};
+use super::{ModelStage, REST_S, Run, config};
 use crate::procedure::HOLD_REMEDY;
 use crate::procedure::arm::MotionArm;
 use crate::procedure::error::ProcedureError;
@@ -26,10 +26,10 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             return Ok(());
         }
         let before_s = self.progress.moved_s;
-        self.ensure(Stage::Start)?;
-        let config = config::<N>(&self.model(Stage::Start)?)?;
-        if self.falls() {
-            // Gravity that the model lacks lets the arm sink into its position loops; that is no motion of a ramp.
+        self.ensure_model(ModelStage::Start)?;
+        let config = config::<N>(&self.model(ModelStage::Start)?)?;
+        if self.falls_without_torque() {
+            // Gravity that the model lacks lets the arm sink in its position loops; a ramp must not count this motion.
             self.motion("settle", &|_| {
                 vec![Step::wait(Request::GravityHold, SETTLE_S)]
             })?;
@@ -80,7 +80,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         let from_rad = self.arm.position_rad()?;
         let mut steps = ramp(config, &from_rad, pose_rad, joint, slope);
         if joint == 0 && up {
-            // The first ramp begins where the arm is held: no move has been tried yet.
+            // The first ramp begins in the present pose, because no move has been tried yet.
             let moves = |step: &Step<N>| matches!(step.request, Request::Move { .. });
             steps.retain(|step| !moves(step));
         }

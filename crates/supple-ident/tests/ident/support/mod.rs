@@ -31,7 +31,7 @@ pub fn random_arm<const N: usize>(seed: u64) -> Arm<N> {
     Arm::new(&joints, Pose::IDENTITY, None, gravity).unwrap()
 }
 
-/// Sums of sinusoids for the `moving` joints; the other joints rest at distinct angles.
+/// Sums of sinusoids for the `identified_joints`; the other joints rest at distinct angles.
 pub fn motion<const N: usize>(
     truth: &Arm<N>,
     friction: &[Friction; N],
@@ -81,6 +81,6 @@ pub fn motion<const N: usize>(
         cutoff_hz: None,
         start_s: 0.0,
         torque_delay_s: 0.0,
-        masks: Vec::new(),
+        excluded_intervals: Vec::new(),
     }
 }

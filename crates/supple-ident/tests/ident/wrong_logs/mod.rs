@@ -1,4 +1,4 @@
-//! Wrong logs are named before a fit, sound ones are not.
+//! Errors in logs are reported before a fit; correct logs cause no report.
 
 mod variants;
 
@@ -67,7 +67,7 @@ fn named(variant: &Variant, findings: &[Finding]) -> bool {
     })
 }
 
-/// Number of variants that are named; prints the others.
+/// Returns the number of variants that are reported; prints the others.
 fn count<const N: usize>(
     arm: &Arm<N>,
     log: &Log,
@@ -99,7 +99,7 @@ fn count<const N: usize>(
 
 /// Some of the variants, for builds without optimisation.
 #[test]
-fn a_flipped_sign_and_currents_are_named_and_a_sound_log_is_not() {
+fn a_wrong_sign_and_currents_instead_of_torques_are_reported_and_a_correct_log_is_not() {
     let arm = tx40::description().arm::<6>().expect("six joints");
     let log = tx40::log();
     let preparation = Preparation {
@@ -125,7 +125,7 @@ fn a_flipped_sign_and_currents_are_named_and_a_sound_log_is_not() {
     );
 }
 
-/// A joint that turns slowly is, from sample to sample, moved less by its motion than by the noise of its encoder.
+/// In slow motion, the change of the angle from sample to sample is smaller than the noise of the encoder.
 #[test]
 fn noise_in_slow_motion_is_no_lost_sample_and_lost_samples_are_found_in_noise() {
     let arm = tx40::description().arm::<6>().expect("six joints");
@@ -158,7 +158,7 @@ fn noise_in_slow_motion_is_no_lost_sample_and_lost_samples_are_found_in_noise() 
             );
         }
     }
-    // One of a hundred samples while the joints turn fast enough to tell.
+    // One of a hundred samples is lost while the joints move fast enough for a detection.
     for (rate_hz, amplitude_rad) in [(1000.0, 1.0), (100.0, 0.1), (50.0, 0.1)] {
         assert!(
             lost(&log(rate_hz, amplitude_rad, &|i| i % 100 != 17)),
@@ -169,13 +169,13 @@ fn noise_in_slow_motion_is_no_lost_sample_and_lost_samples_are_found_in_noise() 
 
 #[test]
 #[ignore = "all variants take minutes without optimisation: cargo test --release -p supple-ident -- --include-ignored tx40"]
-fn errors_of_a_log_of_a_tx40_are_named() {
+fn errors_in_a_log_of_a_tx40_are_reported() {
     let arm = tx40::description().arm::<6>().expect("six joints");
     let log = tx40::log();
     let preparation = Preparation {
         rate_hz: Some(5000.0),
         cutoff_hz: Some(40.0),
-        keep_every: 10,
+        decimation_factor: 10,
         ..Preparation::default()
     };
     let sound = findings(&arm, &log, &[(4, 5)], &preparation);
@@ -196,7 +196,7 @@ fn errors_of_a_log_of_a_tx40_are_named() {
 
 #[test]
 #[ignore = "needs the logs of a UR10e, which may not be redistributed: SUPPLE_UR10E_DIR, `./ci.sh ur10e`"]
-fn errors_of_a_log_of_a_ur10e_are_named() {
+fn errors_in_a_log_of_a_ur10e_are_reported() {
     let folder = std::env::var_os("SUPPLE_UR10E_DIR").expect("SUPPLE_UR10E_DIR names their folder");
     let folder = std::path::Path::new(&folder);
     let arm = ur10e::description(folder).arm::<6>().expect("six joints");
@@ -263,7 +263,7 @@ fn a_delay_put_into_a_log_is_found() {
     let preparation = Preparation {
         rate_hz: Some(5000.0),
         cutoff_hz: Some(40.0),
-        keep_every: 10,
+        decimation_factor: 10,
         ..Preparation::default()
     };
     let moving: Vec<usize> = (0..6).collect();

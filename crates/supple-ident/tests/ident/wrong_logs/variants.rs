@@ -1,22 +1,22 @@
-//! Thirty-nine errors of a log, each applied to a sound one.
+//! Thirty-nine errors of a log, each applied to a correct log.
 
 use supple_ident::log_checks::Problem;
 use supple_ident::{DMatrix, Log};
 use supple_random::Random;
 
-/// A log with one error, and what may be reported of it.
+/// A log with one error, and the permitted reports.
 pub struct Variant {
     pub name: String,
     pub log: Log,
-    /// Any of these names it.
+    /// Reports of which any one is correct.
     pub problems: Vec<Problem>,
-    /// Joint that must be named; `None` if it concerns all.
+    /// Joint that must be reported; `None` if the error affects all joints.
     pub joint: Option<usize>,
 }
 
-/// What an arm's variants are made with.
+/// Data from which the variants of an arm's log are made.
 pub struct Sizes {
-    /// Joint whose torque carries weight, a second one, and one of the wrist.
+    /// Joint that carries weight, a second such joint, and a wrist joint.
     pub heavy: usize,
     pub second: usize,
     pub wrist: usize,
@@ -136,7 +136,7 @@ pub fn all(log: &Log, s: &Sizes, rate_hz: f64) -> Vec<Variant> {
         ("clock half as fast", 0.5),
         ("clock 1.1 times too fast", 1.1),
     ] {
-        // Velocities that the robot measures have its own clock.
+        // Velocities measured by the robot have the robot's clock.
         let changed = scaled(log, |l| l.t_s.iter_mut().for_each(|t| *t *= factor));
         add(name, None, &[TimeScale], changed);
     }
@@ -304,7 +304,7 @@ pub fn all(log: &Log, s: &Sizes, rate_hz: f64) -> Vec<Variant> {
         &[LostSamples],
         kept(log, &block, step),
     );
-    // Frozen where the joint moves fast.
+    // The angle is frozen while the joint moves fast.
     let fast = |j: usize| {
         let reach = (0.02 * rate_hz).round().max(1.0) as usize;
         let speed = |i: usize| (log.q_rad[(i + reach, j)] - log.q_rad[(i - reach, j)]).abs();

@@ -355,7 +355,7 @@ fn errors_in_a_toml_are_rejected() {
     );
 }
 
-/// A branch beside the chain is frozen with a warning, whatever its joint; the tip's own chain is not.
+/// A branch beside the chain is frozen with a warning, for any type of its joint; the chain to the tip is not frozen.
 #[test]
 fn a_movable_branch_is_frozen_with_a_warning() {
     let free = with_toml("finger_joint = 0.3", "").expect("frozen");

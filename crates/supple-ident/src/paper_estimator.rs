@@ -5,7 +5,7 @@
 //! pseudo-inverse gives the minimum-norm solution, of which ten combinations are determined. Compare parameter
 //! sets by [`Parameters::base`].
 
-use crate::base::{BaseParameters, RANK_TOLERANCE};
+use crate::base_parameters::{BaseParameters, RANK_TOLERANCE};
 use crate::error::{IdentError, shape_error};
 use crate::joint_rows::JointRows;
 use crate::motion::Motion;
@@ -31,7 +31,7 @@ pub struct Estimate {
     pub residual_nm: f64,
 }
 
-/// `known` with its `psi` replaced.
+/// Returns `known` with its `psi` replaced.
 pub fn with_psi(known: &Parameters, psi: &[f64; 12]) -> Parameters {
     let [ix1, ix2, iz2, iy2, m2r2, m3r3, ix3, iy3, iz3, v1, v2, v3] = *psi;
     Parameters {
@@ -98,7 +98,7 @@ pub fn estimate(known: &Parameters, motion: &Motion) -> Result<Estimate, IdentEr
             .copy_from(&(at(&motion.tau) - rest));
     }
     let block = stacked.reduced(0.0, None);
-    let columns = BaseParameters::of(&block.a(), RANK_TOLERANCE)?;
+    let columns = BaseParameters::from_regressor(&block.a(), RANK_TOLERANCE)?;
     if columns.rank() < 10 {
         return Err(IdentError::Singular {
             problem: format!(
@@ -122,7 +122,7 @@ pub fn estimate(known: &Parameters, motion: &Motion) -> Result<Estimate, IdentEr
     })
 }
 
-/// The paper's base parameters are linear in psi: their covariance is that of `T psi`.
+/// Returns the standard deviations of the paper's base parameters, which are linear in psi: their covariance is that of `T psi`.
 fn base_deviations(a: &DMatrix<f64>, noise: f64) -> Result<[f64; 10], IdentError> {
     let inverse = crate::estimate::pseudo_inverse(a, RANK_TOLERANCE)?;
     let covariance = &inverse * inverse.transpose();

@@ -1,4 +1,4 @@
-//! Identifiable combinations of the regressor columns.
+//! Base parameters: the identifiable combinations of the regressor columns.
 //!
 //! Columns are scaled to unit length and selected by QR with column pivoting. Once the diagonal drops below
 //! `tolerance` times its first entry, the remaining columns depend on those selected:
@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 /// Diagonal entries below this fraction of the first are rounding errors.
 pub const RANK_TOLERANCE: f64 = 1e-8;
 /// Relative tolerance for ties in the pivot search: among columns of almost equal remaining norm the first is
-/// taken. All columns start with equal norm, so rounding would decide otherwise.
+/// selected. All columns start with equal norm, so that without a tolerance rounding would decide.
 const TIE: f64 = 1e-6;
 
 /// Base parameters of a regressor.
@@ -33,7 +33,7 @@ impl BaseParameters {
     ///
     /// # Errors
     /// [`IdentError::Singular`] if every column is zero.
-    pub fn of(a: &DMatrix<f64>, tolerance: f64) -> Result<BaseParameters, IdentError> {
+    pub fn from_regressor(a: &DMatrix<f64>, tolerance: f64) -> Result<BaseParameters, IdentError> {
         let lengths: Vec<f64> = a.column_iter().map(|c| c.norm()).collect();
         let longest = lengths.iter().copied().fold(0.0, f64::max);
         if longest == 0.0 || !longest.is_finite() {
@@ -214,14 +214,14 @@ mod tests {
     fn rounding_does_not_affect_the_choice_of_columns() {
         let mut random = Random::new(4);
         let a = dependent(&mut random);
-        let chosen = BaseParameters::of(&a, RANK_TOLERANCE).unwrap();
+        let chosen = BaseParameters::from_regressor(&a, RANK_TOLERANCE).unwrap();
         assert_eq!(chosen.rank(), 5);
         assert!(chosen.independent.contains(&0), "the first of equals");
         for _ in 0..50 {
             // The same columns in rotated coordinates, which changes only rounding.
             let turn = DMatrix::from_fn(60, 60, |_, _| random.normal()).qr().q();
             let turned = turn * &a * (0.1 + random.uniform());
-            let again = BaseParameters::of(&turned, RANK_TOLERANCE).unwrap();
+            let again = BaseParameters::from_regressor(&turned, RANK_TOLERANCE).unwrap();
             assert_eq!(again.independent, chosen.independent);
             assert!((again.combination - &chosen.combination).amax() < 1e-9);
         }

@@ -1,4 +1,4 @@
-//! A choice between sets of options, with the held-out error of each.
+//! Result of a selection between sets of options, with the held-out error of each.
 
 use crate::options::Options;
 use std::fmt;
@@ -12,12 +12,12 @@ pub struct Candidate {
     pub options: Options,
 }
 
-/// One line of the table.
+/// Result of one candidate.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Line {
+pub struct CandidateResult {
     /// The candidate.
     pub candidate: Candidate,
-    /// Its number of columns.
+    /// Number of columns of its regressor.
     pub columns: usize,
     /// `|tau - tau_hat| / |tau|` of each part, from a fit to the others; empty if the fit failed.
     pub parts: Vec<f64>,
@@ -25,26 +25,26 @@ pub struct Line {
     pub total: f64,
 }
 
-/// All candidates and the chosen one.
+/// Results of all candidates, and the selected one.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Table {
+pub struct SelectionTable {
     /// Results in the order of the candidates.
-    pub lines: Vec<Line>,
+    pub candidates: Vec<CandidateResult>,
     /// Index of the chosen candidate.
     pub chosen: usize,
 }
 
-impl Table {
+impl SelectionTable {
     /// Options of the chosen candidate.
     pub fn options(&self) -> &Options {
-        &self.lines[self.chosen].candidate.options
+        &self.candidates[self.chosen].candidate.options
     }
 }
 
-impl fmt::Display for Table {
+impl fmt::Display for SelectionTable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "  columns  held-out error  candidate")?;
-        for (i, line) in self.lines.iter().enumerate() {
+        for (i, line) in self.candidates.iter().enumerate() {
             let mark = if i == self.chosen { '*' } else { ' ' };
             let (total, name) = (100.0 * line.total, &line.candidate.name);
             writeln!(f, "{mark} {:7}  {total:12.3} %  {name}", line.columns)?;
@@ -53,11 +53,11 @@ impl fmt::Display for Table {
     }
 }
 
-/// A cross-validated choice with its table of held-out errors.
+/// A selection by cross-validation, with its table of held-out errors.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Choice {
-    /// `effects`, `friction`, `load`, `band`, `prior` or `weights`.
+pub struct SelectionResult {
+    /// Name of the option: `effects`, `friction`, `load`, `band`, `prior` or `weights`.
     pub subject: &'static str,
-    /// The candidates.
-    pub table: Table,
+    /// Results of the candidates.
+    pub table: SelectionTable,
 }

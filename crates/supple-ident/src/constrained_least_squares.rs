@@ -7,11 +7,11 @@
 //!
 //! `P = [S h; h' m]`, `S = tr(I)/2 - I`, is the pseudo-inertia: positive definite if and only if some mass
 //! distribution realises it (Wensing, Kim and Slotine, 2018). The second term is the log-det divergence from
-//! the model `P0`, up to a constant; it also determines the parameters that the data do not.
+//! the model `P0`, up to a constant; it also determines the parameters that the data leave undetermined.
 //!
-//! Solved by Newton's method on `objective - mu (sum log det P_k + sum log g_i . x)`, with `mu` reduced in
-//! steps. At the minimum for one `mu`, a centre, the objective is within `mu nu` of its own minimum, where `nu` is
-//! four for each link and one for each `g_i`. This bound is returned with the result.
+//! The solver applies Newton's method to `objective - mu (sum log det P_k + sum log g_i . x)`, with `mu` reduced in
+//! steps. At the minimum for one `mu` (a point of the central path), the objective is within `mu nu` of its own minimum, where
+//! `nu` is four for each link plus one for each `g_i`. The solver returns this bound with the result.
 
 use crate::error::{IdentError, positive};
 use crate::qr_reduction::ReducedSystem;
@@ -154,7 +154,7 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// The prior for the links, one for each other unknown that must not be negative, zero for the rest.
+    /// Start values: the prior for the links, 1 for every other unknown that must not be negative, 0 for the rest.
     fn start(&self) -> DVector<f64> {
         let mut x = DVector::zeros(self.a.ncols());
         for (k, link) in self.constraints.links.iter().enumerate() {
@@ -230,7 +230,7 @@ impl<'a> Problem<'a> {
     }
 
     /// Moves `x` to the minimum of [`Problem::value`] by Newton's method with backtracking; returns the number
-    /// of steps.
+    /// of steps taken.
     fn centre(&self, x: &mut DVector<f64>, mu: f64) -> Result<usize, IdentError> {
         let mut value = self.value(x, mu).ok_or_else(inconsistent_link)?;
         for taken in 0..STEPS {

@@ -6,7 +6,7 @@
 //! limits. The criterion is the condition number of the base regressor, columns scaled to unit length, or minus
 //! the logarithm of the determinant of its information matrix.
 
-use crate::base::{BaseParameters, RANK_TOLERANCE};
+use crate::base_parameters::{BaseParameters, RANK_TOLERANCE};
 use crate::columns::{Columns, FrictionColumns};
 use crate::error::{IdentError, positive};
 use crate::random::{Normal, Random};
@@ -59,8 +59,8 @@ pub struct Workspace {
 /// Options of the design.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DesignOptions {
-    /// Joints to excite, increasing; the others rest at their held or home positions.
-    pub moving: Vec<usize>,
+    /// Joints to excite, in increasing order; the others rest at their held or home positions.
+    pub excited_joints: Vec<usize>,
     /// Length of a period \[s\].
     pub period_s: f64,
     /// Number of periods.
@@ -77,9 +77,9 @@ pub struct DesignOptions {
 
 impl DesignOptions {
     /// Default options for these joints: four periods of 15 s, condition number, 3,000 candidates.
-    pub fn of(moving: &[usize]) -> DesignOptions {
+    pub fn new(excited_joints: &[usize]) -> DesignOptions {
         DesignOptions {
-            moving: moving.to_vec(),
+            excited_joints: excited_joints.to_vec(),
             period_s: 15.0,
             periods: 4.0,
             criterion: Criterion::Condition,
@@ -131,7 +131,13 @@ pub fn design<const N: usize>(
             must: "at most 7200 s",
         });
     }
-    let columns = Columns::new(N, &request.moving, true, FrictionColumns::COULOMB, &[])?;
+    let columns = Columns::new(
+        N,
+        &request.excited_joints,
+        true,
+        FrictionColumns::COULOMB,
+        &[],
+    )?;
     let search = Search {
         config,
         request,
@@ -143,7 +149,7 @@ pub fn design<const N: usize>(
     let mut best: Option<(Fourier<N>, f64)> = None;
     let mut history = Vec::with_capacity(request.candidates);
     let mut step = 0.3;
-    // Independent random starts precede the refinement of the best.
+    // The first candidates are independent random ones; the later ones refine the best.
     let starts = (request.candidates / 10).max(1);
     for tried in 0..request.candidates {
         let candidate = match &best {
@@ -171,11 +177,11 @@ pub fn design<const N: usize>(
     }
     let Some((series, _)) = best else {
         return Err(IdentError::Singular {
-            problem: "no motion tried meets the limits and moves every joint".to_owned(),
+            problem: "no candidate motion meets the limits and moves every joint".to_owned(),
             remedy: "widen the joint ranges, the workspace or the speeds",
         });
     };
-    let base = BaseParameters::of(&search.regressor(&series), RANK_TOLERANCE)?;
+    let base = BaseParameters::from_regressor(&search.regressor(&series), RANK_TOLERANCE)?;
     Ok(ExcitationDesign {
         series,
         rank: base.rank(),
@@ -192,7 +198,7 @@ pub fn design<const N: usize>(
 pub fn slow_series<const N: usize>(
     config: &Config<N>,
     home_rad: &Vector<N>,
-    moving: &[usize],
+    excited_joints: &[usize],
     speed_rad_per_s: f64,
     period_s: f64,
 ) -> Result<Fourier<N>, IdentError> {
@@ -200,7 +206,7 @@ pub fn slow_series<const N: usize>(
     positive("period_s", period_s)?;
     let omega = TAU / period_s;
     let mut series = Fourier::at_rest(*home_rad, omega);
-    for (order, &joint) in moving.iter().enumerate() {
+    for (order, &joint) in excited_joints.iter().enumerate() {
         let k = order % 3;
         let (lower, upper) = range(config, joint);
         let reach = 0.45 * (upper - lower);
@@ -213,16 +219,16 @@ pub fn slow_series<const N: usize>(
     Ok(series)
 }
 
-/// One run in each direction at constant speed, for torque ripple: each joint's speed stays within 1.5 % of
-/// `speed_rad_per_s` over 57 % of a period and reverses smoothly in the rest. A joint whose range is too short
-/// for that moves more slowly. The joints reverse one after the other.
+/// Motion in each direction at nearly constant speed, for torque ripple: each joint's speed stays within 1.5 % of
+/// `speed_rad_per_s` over 57 % of a period and reverses smoothly in the rest. A joint with a short range
+/// moves more slowly. The joints reverse one after the other.
 ///
 /// # Errors
 /// Options out of range.
 pub fn constant_speed_series<const N: usize>(
     config: &Config<N>,
     home_rad: &Vector<N>,
-    moving: &[usize],
+    excited_joints: &[usize],
     speed_rad_per_s: f64,
     period_s: f64,
 ) -> Result<Fourier<N>, IdentError> {
@@ -230,11 +236,11 @@ pub fn constant_speed_series<const N: usize>(
     positive("period_s", period_s)?;
     let omega = TAU / period_s;
     let mut series = Fourier::at_rest(*home_rad, omega);
-    for (order, &joint) in moving.iter().enumerate() {
+    for (order, &joint) in excited_joints.iter().enumerate() {
         let (lower, upper) = range(config, joint);
         let reach = 0.45 * (upper - lower);
         let amplitude = (speed_rad_per_s / omega).min(reach / CONSTANT_SPEED_MAX_SUM);
-        let phase = PI * order as f64 / moving.len() as f64;
+        let phase = PI * order as f64 / excited_joints.len() as f64;
         for (k, weight) in CONSTANT_SPEED_HARMONICS {
             let (sine, cosine) = (k as f64 * phase).sin_cos();
             let size = amplitude * weight / k as f64;
@@ -259,27 +265,27 @@ fn range<const N: usize>(config: &Config<N>, joint: usize) -> (f64, f64) {
     )
 }
 
-/// Independent columns for random motion of the moving joints.
+/// Independent columns of the regressor for random motion of the excited joints.
 fn structural_base<const N: usize>(
     config: &Config<N>,
     home_rad: &Vector<N>,
     columns: &Columns,
 ) -> Result<Vec<usize>, IdentError> {
     let mut random = Random::new(1);
-    let moving = columns.moving().len();
+    let joint_count = columns.identified_joints().len();
     let states = 4 * columns.len();
-    let mut all = DMatrix::zeros(states * moving, columns.len());
+    let mut all = DMatrix::zeros(states * joint_count, columns.len());
     for i in 0..states {
         let mut draw = |scale: f64| Vector::<N>::from_fn(|_, _| scale * random.signed());
         let (anywhere, qd, qdd) = (draw(PI), draw(2.0), draw(4.0));
         let q = Vector::<N>::from_fn(|j, _| {
-            let moves = columns.moving().contains(&j);
+            let moves = columns.identified_joints().contains(&j);
             if moves { anywhere[j] } else { home_rad[j] }
         });
         let block = rows(&config.arm, columns, &q, &qd, &qdd);
-        all.rows_mut(i * moving, moving).copy_from(&block);
+        all.rows_mut(i * joint_count, joint_count).copy_from(&block);
     }
-    Ok(BaseParameters::of(&all, RANK_TOLERANCE)?.independent)
+    Ok(BaseParameters::from_regressor(&all, RANK_TOLERANCE)?.independent)
 }
 
 struct Search<'a, const N: usize> {
@@ -295,7 +301,7 @@ impl<const N: usize> Search<'_, N> {
         let mut series = Fourier::at_rest(*self.home_rad, TAU / self.request.period_s);
         series.ramp_s = 0.1 * self.request.period_s;
         series.duration_s = self.request.periods * self.request.period_s + series.ramp_s;
-        for &joint in &self.request.moving {
+        for &joint in &self.request.excited_joints {
             let (lower, upper) = range(self.config, joint);
             series.centre_rad[joint] = lower + (upper - lower) * (0.3 + 0.4 * random.uniform());
             for k in 0..HARMONICS {
@@ -309,7 +315,7 @@ impl<const N: usize> Search<'_, N> {
 
     fn mutated(&self, parent: &Fourier<N>, step: f64, random: &mut Random) -> Fourier<N> {
         let mut series = *parent;
-        for &joint in &self.request.moving {
+        for &joint in &self.request.excited_joints {
             let (lower, upper) = range(self.config, joint);
             let span = upper - lower;
             let centre = series.centre_rad[joint] + 0.2 * step * span * random.normal();
@@ -323,7 +329,7 @@ impl<const N: usize> Search<'_, N> {
         series
     }
 
-    /// States over one period at full speed.
+    /// Reference states over one period at full speed.
     fn states(&self, series: &Fourier<N>) -> impl Iterator<Item = JointReference<N>> {
         let (series, period_s) = (*series, series.period_s());
         let steady = Fourier {
@@ -345,7 +351,7 @@ impl<const N: usize> Search<'_, N> {
             }
         };
         // Joint by joint: angle and speed are linear in the joint's amplitudes.
-        for &joint in &self.request.moving {
+        for &joint in &self.request.excited_joints {
             let (lower, upper) = range(self.config, joint);
             let centre = series.centre_rad[joint];
             let limit = SPEED_FRACTION * self.config.limits.joint_speed_rad_per_s[joint];
@@ -369,7 +375,7 @@ impl<const N: usize> Search<'_, N> {
             if by >= 1.0 {
                 return Some(series);
             }
-            for &joint in &self.request.moving {
+            for &joint in &self.request.excited_joints {
                 scale(&mut series, joint, by.clamp(0.8, 0.99));
             }
         }
@@ -402,13 +408,13 @@ impl<const N: usize> Search<'_, N> {
     }
 
     fn regressor(&self, series: &Fourier<N>) -> DMatrix<f64> {
-        let moving = self.request.moving.len();
-        let mut all = DMatrix::zeros(POINTS * moving, self.independent.len());
+        let joint_count = self.request.excited_joints.len();
+        let mut all = DMatrix::zeros(POINTS * joint_count, self.independent.len());
         for (i, state) in self.states(series).enumerate() {
             let (q, qd) = (&state.position_rad, &state.velocity_rad_per_s);
             let qdd = &state.acceleration_rad_per_s2;
             let block = rows(&self.config.arm, &self.columns, q, qd, qdd);
-            all.rows_mut(i * moving, moving)
+            all.rows_mut(i * joint_count, joint_count)
                 .copy_from(&block.select_columns(&self.independent));
         }
         all

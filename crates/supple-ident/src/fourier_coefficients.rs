@@ -1,15 +1,15 @@
-//! A Fourier series ([`Fourier`]) as plain lists with a run-time number of joints, for files and other
+//! Coefficients of a Fourier series ([`Fourier`]) as plain lists with a run-time number of joints, for files and other
 //! languages.
 
-use crate::design::MAX_DURATION_S;
 use crate::error::{IdentError, shape_error};
+use crate::excitation_design::MAX_DURATION_S;
 use serde::{Deserialize, Serialize};
 use supple_core::Vector;
 use supple_core::trajectory::{Fourier, HARMONICS};
 
 /// The fields of [`Fourier`]: one list for each harmonic, one number for each joint.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct SeriesLists {
+pub struct FourierCoefficients {
     /// Constant term of each joint \[rad\].
     pub centre_rad: Vec<f64>,
     /// Amplitudes of the sines, (harmonics, joints) \[rad\].
@@ -24,13 +24,13 @@ pub struct SeriesLists {
     pub ramp_s: f64,
 }
 
-impl<const N: usize> From<&Fourier<N>> for SeriesLists {
-    fn from(series: &Fourier<N>) -> SeriesLists {
+impl<const N: usize> From<&Fourier<N>> for FourierCoefficients {
+    fn from(series: &Fourier<N>) -> FourierCoefficients {
         let lists = |all: &[Vector<N>; HARMONICS]| {
             let list = |column: &Vector<N>| column.as_slice().to_vec();
             all.iter().map(list).collect()
         };
-        SeriesLists {
+        FourierCoefficients {
             centre_rad: series.centre_rad.as_slice().to_vec(),
             sine_rad: lists(&series.sine_rad),
             cosine_rad: lists(&series.cosine_rad),
@@ -41,8 +41,8 @@ impl<const N: usize> From<&Fourier<N>> for SeriesLists {
     }
 }
 
-impl SeriesLists {
-    /// The series of an arm of `N` joints.
+impl FourierCoefficients {
+    /// Converts the coefficients to the series of an arm with `N` joints.
     ///
     /// # Errors
     /// [`IdentError::Shape`] for lists of other lengths, or a duration out of range.
@@ -87,7 +87,7 @@ impl SeriesLists {
 
 #[cfg(test)]
 mod tests {
-    use super::SeriesLists;
+    use super::FourierCoefficients;
     use supple_core::Vector;
     use supple_core::trajectory::Fourier;
 
@@ -96,7 +96,7 @@ mod tests {
         let mut series = Fourier::<3>::at_rest(Vector::repeat(0.2), 0.5);
         series.sine_rad[1][2] = 0.7;
         series.cosine_rad[4][0] = -0.1;
-        let lists = SeriesLists::from(&series);
+        let lists = FourierCoefficients::from(&series);
         assert_eq!(lists.fourier::<3>().unwrap(), series);
         let error = lists.fourier::<4>().unwrap_err().to_string();
         assert!(
