@@ -26,7 +26,7 @@ impl<const N: usize> JointNames<N> {
         }))
     }
 
-    /// The names.
+    /// Returns the names.
     pub fn as_slice(&self) -> &[Text] {
         &self.0
     }
@@ -58,7 +58,7 @@ pub struct Gains {
 }
 
 impl Gains {
-    /// The same stiffness \[N/m\] and damping \[N s/m\] along every axis.
+    /// Returns the same stiffness \[N/m\] and damping \[N s/m\] along every axis.
     pub fn isotropic(stiffness_n_per_m: f64, damping_n_s_per_m: f64) -> Gains {
         Gains {
             stiffness_n_per_m: Vector3::repeat(stiffness_n_per_m),
@@ -77,7 +77,7 @@ pub struct RotationalGains {
 }
 
 impl RotationalGains {
-    /// The same stiffness \[N m/rad\] and damping \[N m s/rad\] about every axis.
+    /// Returns the same stiffness \[N m/rad\] and damping \[N m s/rad\] about every axis.
     pub fn isotropic(stiffness_nm_per_rad: f64, damping_nm_s_per_rad: f64) -> RotationalGains {
         RotationalGains {
             stiffness_nm_per_rad: Vector3::repeat(stiffness_nm_per_rad),
@@ -106,7 +106,7 @@ pub struct PoseLaw<const N: usize> {
 }
 
 impl<const N: usize> Default for PoseLaw<N> {
-    /// For the wrist of the WAM: 0.5 N m/rad and 0.02 N m s/rad, at most 0.5 rad/s, 0.5 rad of error; no posture.
+    /// Returns gains for the wrist of the WAM: 0.5 N m/rad and 0.02 N m s/rad, at most 0.5 rad/s, 0.5 rad of error; no posture.
     fn default() -> PoseLaw<N> {
         PoseLaw {
             gains: RotationalGains::isotropic(0.5, 0.02),
@@ -158,7 +158,7 @@ pub struct Law {
 }
 
 impl Law {
-    /// Equation (3.6) exactly as printed, with the continuous (3.2): measured velocity in the
+    /// Returns equation (3.6) exactly as printed, with the continuous (3.2): measured velocity in the
     /// friction, no `M Xo''`, the arm's own inertia.
     pub fn as_published(gains: Gains) -> Law {
         Law {
@@ -276,7 +276,7 @@ pub struct JointGains<const N: usize> {
 }
 
 impl<const N: usize> JointGains<N> {
-    /// No stiffness and no damping.
+    /// Returns gains without stiffness and damping.
     pub fn zero() -> JointGains<N> {
         JointGains {
             stiffness_nm_per_rad: Vector::zeros(),

@@ -93,7 +93,7 @@ fn probing_plan(
     Ok((plan, probe))
 }
 
-/// Maximum opposing force beyond the friction uncertainty; with a probe, within 40 ms of the first touch.
+/// Returns the maximum opposing force beyond the friction uncertainty; with a probe, within 40 ms of the first touch.
 fn force_beyond_friction_uncertainty(
     plan: &Plan<4>,
     estimator_rad_per_s: f64,

@@ -60,7 +60,7 @@ fn track(
     Ok((words, terms))
 }
 
-/// The median stroke of probing with these terms and learning on, or without either.
+/// Returns the median stroke of probing with these terms and learning on, or without either.
 fn probing(
     setup: &Setup<4>,
     stiffness_n_per_m: f64,

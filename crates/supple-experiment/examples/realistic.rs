@@ -87,7 +87,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// Sinusoid and arc learning; then the warm sinusoid, and sinusoid and arc calibrated alone, as asked.
+/// Returns the sinusoid and arc learning; then the warm sinusoid, and sinusoid and arc calibrated alone, as asked.
 fn tracked(
     arm: &Description,
     options: &Options,

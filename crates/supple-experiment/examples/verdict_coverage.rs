@@ -18,7 +18,7 @@ const CHOSEN_ON: [Range<u64>; 2] = [0..55, 130..185];
 /// Stiffness of the tracking \[N/m\].
 const STIFFNESS_N_PER_M: f64 = 5.0;
 
-/// The interval from the held-out motion in a file.
+/// Returns the interval from the held-out motion in a file.
 fn interval<const N: usize>(
     description: &Description,
     text: &str,

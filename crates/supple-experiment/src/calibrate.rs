@@ -62,7 +62,7 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// Model errors of 5 % in gravity and 30 % in friction, the noise of the arm's encoders, no ripple.
+    /// Creates options with model errors of 5 % in gravity and 30 % in friction, the noise of the arm's encoders, no ripple.
     pub fn new(seed: u64) -> Calibration {
         Calibration {
             seed,

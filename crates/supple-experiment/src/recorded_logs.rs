@@ -16,7 +16,7 @@ pub fn log_of(recording: &Recording) -> Log {
     }
 }
 
-/// Preparation of the project's own logs: a command acts during the following cycle.
+/// Returns the preparation of the project's own logs: a command acts during the following cycle.
 pub fn preparation(period_s: f64, cutoff_hz: f64) -> Preparation {
     let kept_hz = 12.5 * cutoff_hz;
     let decimation_factor = ((1.0 / period_s) / kept_hz).round().max(1.0) as usize;

@@ -26,7 +26,7 @@ pub struct Step<const N: usize> {
 }
 
 impl<const N: usize> Step<N> {
-    /// A step of fixed duration that is not recorded.
+    /// Returns a step of fixed duration that is not recorded.
     pub fn wait(request: Request<N>, duration_s: f64) -> Step<N> {
         Step {
             request,
@@ -68,7 +68,7 @@ pub type StepCallback<'a, const N: usize> =
     dyn FnMut(&Cycle<'_, N>, usize) -> Result<(), ExperimentError> + 'a;
 
 impl<const N: usize> RequestSequence<N> {
-    /// Maximum simulated time \[s\].
+    /// Returns the maximum simulated time \[s\].
     pub fn duration_s(&self) -> f64 {
         self.steps.iter().map(|step| step.duration_s).sum()
     }
@@ -162,7 +162,7 @@ impl<const N: usize> RequestSequence<N> {
 }
 
 impl Recording {
-    /// Of rows of time \[s\], angles \[rad\] and torques \[N m\].
+    /// Creates a recording of rows of time \[s\], angles \[rad\] and torques \[N m\].
     pub(crate) fn of<const N: usize>(rows: &[(f64, Vector<N>, Vector<N>)]) -> Recording {
         Recording {
             t_s: rows.iter().map(|row| row.0).collect(),

@@ -54,7 +54,7 @@ pub struct Trace {
     pub samples: Vec<Sample>,
 }
 
-/// Base coordinates as an array.
+/// Returns the base coordinates as an array.
 pub(crate) fn xyz(v: &supple_core::nalgebra::Vector3<f64>) -> [f64; 3] {
     [v.x, v.y, v.z]
 }

@@ -94,23 +94,23 @@ impl BaseParameters {
         self
     }
 
-    /// Number of identifiable combinations.
+    /// Returns the number of identifiable combinations.
     pub fn rank(&self) -> usize {
         self.independent.len()
     }
 
-    /// `x_independent + B x_dependent`.
+    /// Returns `x_independent + B x_dependent`.
     pub fn values(&self, x: &DVector<f64>) -> DVector<f64> {
         let part = |list: &[usize]| DVector::from_iterator(list.len(), list.iter().map(|i| x[*i]));
         part(&self.independent) + &self.combination * part(&self.dependent)
     }
 
-    /// Standard deviation of each base parameter for independent noise of `noise` on each row.
+    /// Returns the standard deviation of each base parameter for independent noise of `noise` on each row.
     pub fn standard_deviations(&self, noise: f64) -> DVector<f64> {
         self.gram_inverse.diagonal().map(|v| noise * v.sqrt())
     }
 
-    /// A draw from the zero-mean normal distribution of the base parameters, for independent noise of `noise`
+    /// Returns a draw from the zero-mean normal distribution of the base parameters, for independent noise of `noise`
     /// on each row; `None` if rounding makes the covariance singular.
     pub(crate) fn draw(&self, noise: f64, random: &mut Random) -> Option<DVector<f64>> {
         let root = nalgebra::Cholesky::new(self.gram_inverse.clone())?;
@@ -118,7 +118,7 @@ impl BaseParameters {
         Some(root.l() * normal * noise)
     }
 
-    /// Each base parameter as text, such as `Izz1 + 1 Iyy2 - 0.55 mcx2`.
+    /// Returns each base parameter as text, such as `Izz1 + 1 Iyy2 - 0.55 mcx2`.
     pub fn text(&self, names: &[String]) -> Vec<String> {
         let sum = |i: usize| {
             let mut text = names[self.independent[i]].clone();
@@ -130,7 +130,7 @@ impl BaseParameters {
         (0..self.rank()).map(sum).collect()
     }
 
-    /// Null space as text: one direction for each dependent column in which the parameters can change without a
+    /// Returns the null space as text: one direction for each dependent column in which the parameters can change without a
     /// change of torque.
     pub fn null_space_text(&self, names: &[String]) -> Vec<String> {
         let direction = |k: usize| {
@@ -157,7 +157,7 @@ fn term(coefficient: f64, name: &str) -> String {
     }
 }
 
-/// Columns in the order of pivoting, until the rest are negligible. Each step selects the column of largest
+/// Returns the columns in the order of pivoting, until the rest are negligible. Each step selects the column of largest
 /// remaining norm, the first of those that tie, and removes its direction twice from the others.
 pub(crate) fn pivot_order(columns: &DMatrix<f64>, tolerance: f64) -> Vec<usize> {
     let mut rest = columns.clone();
@@ -198,7 +198,7 @@ mod tests {
     use crate::random::{Normal, Random};
     use nalgebra::DMatrix;
 
-    /// Eight columns of rank five, three of them combinations of others.
+    /// Returns the eight columns of rank five, three of them combinations of others.
     fn dependent(random: &mut Random) -> DMatrix<f64> {
         let free = DMatrix::from_fn(60, 5, |_, _| random.normal());
         let mix = DMatrix::from_fn(5, 8, |i, j| match (i, j) {

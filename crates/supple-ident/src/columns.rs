@@ -221,32 +221,32 @@ impl Columns {
         self
     }
 
-    /// Other effects than friction.
+    /// Returns the other effects than friction.
     pub fn effects(&self) -> &Effects {
         &self.effects
     }
 
-    /// Number of joints of the arm.
+    /// Returns the number of joints of the arm.
     pub fn dof(&self) -> usize {
         self.dof
     }
 
-    /// Identified joints: those whose torques are modelled.
+    /// Returns the identified joints: those whose torques are modelled.
     pub fn identified_joints(&self) -> &[usize] {
         &self.identified_joints
     }
 
-    /// Friction columns of each identified joint.
+    /// Returns the friction columns of each identified joint.
     pub fn friction(&self) -> &FrictionColumns {
         &self.friction
     }
 
-    /// The columns, links first.
+    /// Returns the columns, links first.
     pub fn list(&self) -> &[Column] {
         &self.columns
     }
 
-    /// Number of columns.
+    /// Returns the number of columns.
     pub fn len(&self) -> usize {
         self.columns.len()
     }
@@ -256,12 +256,12 @@ impl Columns {
         self.columns.is_empty()
     }
 
-    /// Index of a column.
+    /// Returns the index of a column.
     pub fn position(&self, column: Column) -> Option<usize> {
         self.columns.iter().position(|c| *c == column)
     }
 
-    /// Names, such as `Izz2` or `S0`: links and joints are counted from 0.
+    /// Returns the names, such as `Izz2` or `S0`: links and joints are counted from 0.
     pub fn names(&self) -> Vec<String> {
         let name = |column: &Column| match *column {
             Column::Link { link, entry } => format!("{}{link}", LINK_NAMES[entry]),
@@ -285,7 +285,7 @@ impl Columns {
         self.columns.iter().map(name).collect()
     }
 
-    /// Linear constraints `sum c_i x_i >= 0`: friction is dissipative, rotor inertias are not negative. Each is
+    /// Returns the linear constraints `sum c_i x_i >= 0`: friction is dissipative, rotor inertias are not negative. Each is
     /// a list of (index, coefficient).
     pub fn not_negative(&self) -> Vec<Vec<(usize, f64)>> {
         let mut forms = Vec::new();

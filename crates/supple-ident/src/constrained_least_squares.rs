@@ -50,7 +50,7 @@ pub struct Solution {
     pub steps: usize,
 }
 
-/// Pseudo-inertia of ten parameters.
+/// Returns the pseudo-inertia of ten parameters.
 pub fn pseudo_inertia(p: &SVector<f64, 10>) -> Matrix4<f64> {
     let [m, hx, hy, hz, xx, xy, yy, xz, yz, zz] = p.data.0[0];
     let half = 0.5 * (xx + yy + zz);
@@ -75,7 +75,7 @@ pub fn pseudo_inertia(p: &SVector<f64, 10>) -> Matrix4<f64> {
 }
 
 impl Constraints {
-    /// Degree of the barrier.
+    /// Returns the degree of the barrier.
     fn nu(&self) -> f64 {
         (4 * self.links.len() + self.not_negative.len()) as f64
     }
@@ -154,7 +154,7 @@ impl<'a> Problem<'a> {
         })
     }
 
-    /// Start values: the prior for the links, 1 for every other unknown that must not be negative, 0 for the rest.
+    /// Returns the start values: the prior for the links, 1 for every other unknown that must not be negative, 0 for the rest.
     fn start(&self) -> DVector<f64> {
         let mut x = DVector::zeros(self.a.ncols());
         for (k, link) in self.constraints.links.iter().enumerate() {
@@ -176,12 +176,12 @@ impl<'a> Problem<'a> {
         form.iter().map(|(i, c)| c * x[*i]).sum()
     }
 
-    /// Objective without the barrier; `None` outside the constraints.
+    /// Returns the objective without the barrier; `None` outside the constraints.
     fn objective(&self, x: &DVector<f64>) -> Option<f64> {
         self.value(x, 0.0)
     }
 
-    /// Objective with the barrier of weight `mu`; `None` outside the constraints.
+    /// Returns the objective with the barrier of weight `mu`; `None` outside the constraints.
     fn value(&self, x: &DVector<f64>, mu: f64) -> Option<f64> {
         let gamma = self.constraints.prior_weight;
         let mut value = 0.5 * (&self.a * x - &self.b).norm_squared();
@@ -200,7 +200,7 @@ impl<'a> Problem<'a> {
         value.is_finite().then_some(value)
     }
 
-    /// Gradient and Hessian of [`Problem::value`].
+    /// Returns the gradient and Hessian of [`Problem::value`].
     fn derivatives(&self, x: &DVector<f64>, mu: f64) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let gamma = self.constraints.prior_weight;
         let mut gradient = self.a.tr_mul(&(&self.a * x - &self.b));
@@ -261,7 +261,7 @@ impl<'a> Problem<'a> {
     }
 }
 
-/// `-H^-1 g`, with unknowns scaled so that the diagonal of `H` is one.
+/// Returns `-H^-1 g`, with unknowns scaled so that the diagonal of `H` is one.
 fn newton_step(
     gradient: &DVector<f64>,
     hessian: &DMatrix<f64>,

@@ -98,7 +98,7 @@ pub fn estimate_delay<const N: usize>(
     })
 }
 
-/// Mean over the joints of the logarithm of the held-out error.
+/// Returns the mean over the joints of the logarithm of the held-out error.
 fn held_out<const N: usize>(context: &FitContext<'_, N>, parts: &[GramMatrices]) -> f64 {
     let joints = context.columns.identified_joints().len();
     let mut errors = vec![[0.0, 0.0]; joints];

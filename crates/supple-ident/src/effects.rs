@@ -31,7 +31,7 @@ pub struct Effects {
 }
 
 impl Effects {
-    /// All effects, for an arm with this `j2mp`.
+    /// Returns all effects, for an arm with this `j2mp`.
     pub fn all(motor_from_joint: DMatrix<f64>) -> Effects {
         Effects {
             springs: true,
@@ -55,7 +55,7 @@ impl Effects {
         (0..motors).filter(|motor| drives(*motor) > 1).collect()
     }
 
-    /// `r_m`.
+    /// Returns `r_m`.
     pub(crate) fn row(&self, motor: usize) -> Vec<f64> {
         let Some(matrix) = &self.motor_from_joint else {
             return Vec::new();

@@ -17,7 +17,7 @@ const MAD: f64 = 1.4826;
 /// Maximum number of reweighting iterations.
 const MAX_REWEIGHTINGS: usize = 20;
 
-/// Moore-Penrose inverse by a complete orthogonal decomposition: `A = Q W` by QR with column pivoting,
+/// Returns the Moore-Penrose inverse by a complete orthogonal decomposition: `A = Q W` by QR with column pivoting,
 /// `W' = Z T` by QR, so that the inverse is `Z T'^-1 Q'`. Columns whose remaining norm is below `tolerance`
 /// times the largest count as dependent, as in [`crate::base_parameters`].
 ///
@@ -41,7 +41,7 @@ pub fn pseudo_inverse(a: &DMatrix<f64>, tolerance: f64) -> Result<DMatrix<f64>, 
     Ok(z * inverse.ok_or_else(none)?)
 }
 
-/// Minimum-norm solution of `min |a x - b|`.
+/// Returns the minimum-norm solution of `min |a x - b|`.
 ///
 /// # Errors
 /// As [`pseudo_inverse`].
@@ -86,7 +86,7 @@ pub fn weighted(blocks: &[ReducedSystem], noise_nm: &[f64], columns: usize) -> R
     all
 }
 
-/// RMS residual of each joint \[N m\], at least 1e-6 of the joint's torque, to avoid a division by zero for
+/// Returns the RMS residual of each joint \[N m\], at least 1e-6 of the joint's torque, to avoid a division by zero for
 /// noise-free data.
 pub fn noise_nm(blocks: &[ReducedSystem], x: &DVector<f64>) -> Vec<f64> {
     let rms = |block: &ReducedSystem| {
@@ -100,7 +100,7 @@ pub fn noise_nm(blocks: &[ReducedSystem], x: &DVector<f64>) -> Vec<f64> {
     blocks.iter().map(rms).collect()
 }
 
-/// Weighted least squares: estimates the noise of each joint together with the solution.
+/// Solves by weighted least squares: estimates the noise of each joint together with the solution.
 ///
 /// # Errors
 /// As [`pseudo_inverse`].
@@ -123,7 +123,7 @@ pub fn weighted_least_squares(
     Ok((x, noise))
 }
 
-/// Huber weights of every sample of each joint, from the residuals of `x`.
+/// Returns the Huber weights of every sample of each joint, from the residuals of `x`.
 pub fn huber_weights(joints: &[JointRows], x: &DVector<f64>) -> Vec<Vec<f64>> {
     let of_joint = |joint: &JointRows| {
         let residual = &joint.a * x - &joint.b;

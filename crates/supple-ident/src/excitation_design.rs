@@ -76,7 +76,7 @@ pub struct DesignOptions {
 }
 
 impl DesignOptions {
-    /// Default options for these joints: four periods of 15 s, condition number, 3,000 candidates.
+    /// Returns the default options for these joints: four periods of 15 s, condition number, 3,000 candidates.
     pub fn new(excited_joints: &[usize]) -> DesignOptions {
         DesignOptions {
             excited_joints: excited_joints.to_vec(),
@@ -190,7 +190,7 @@ pub fn design<const N: usize>(
     })
 }
 
-/// Slow sinusoidal motion for friction at low speed and torque ripple: neighbouring joints use different
+/// Returns the slow sinusoidal motion for friction at low speed and torque ripple: neighbouring joints use different
 /// harmonics, with speeds up to `speed_rad_per_s`.
 ///
 /// # Errors
@@ -219,7 +219,7 @@ pub fn slow_series<const N: usize>(
     Ok(series)
 }
 
-/// Motion in each direction at nearly constant speed, for torque ripple: each joint's speed stays within 1.5 % of
+/// Returns the motion in each direction at nearly constant speed, for torque ripple: each joint's speed stays within 1.5 % of
 /// `speed_rad_per_s` over 57 % of a period and reverses smoothly in the rest. A joint with a short range
 /// moves more slowly. The joints reverse one after the other.
 ///
@@ -255,7 +255,7 @@ pub fn constant_speed_series<const N: usize>(
     Ok(series)
 }
 
-/// Range of a joint between its soft zones, with a margin.
+/// Returns the range of a joint between its soft zones, with a margin.
 fn range<const N: usize>(config: &Config<N>, joint: usize) -> (f64, f64) {
     let limits = &config.limits;
     let zone = 1.1 * limits.soft_zone_rad;
@@ -265,7 +265,7 @@ fn range<const N: usize>(config: &Config<N>, joint: usize) -> (f64, f64) {
     )
 }
 
-/// Independent columns of the regressor for random motion of the excited joints.
+/// Returns the independent columns of the regressor for random motion of the excited joints.
 fn structural_base<const N: usize>(
     config: &Config<N>,
     home_rad: &Vector<N>,
@@ -329,7 +329,7 @@ impl<const N: usize> Search<'_, N> {
         series
     }
 
-    /// Reference states over one period at full speed.
+    /// Returns the reference states over one period at full speed.
     fn states(&self, series: &Fourier<N>) -> impl Iterator<Item = JointReference<N>> {
         let (series, period_s) = (*series, series.period_s());
         let steady = Fourier {
@@ -382,7 +382,7 @@ impl<const N: usize> Search<'_, N> {
         None
     }
 
-    /// Scale factor that tip speed, torques and workspace require; 1 if their limits hold.
+    /// Returns the scale factor that tip speed, torques and workspace require; 1 if their limits hold.
     fn limit_scale(&self, state: &JointReference<N>) -> f64 {
         let (config, limits) = (self.config, &self.config.limits);
         let (q, qd) = (&state.position_rad, &state.velocity_rad_per_s);

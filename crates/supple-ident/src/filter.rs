@@ -29,7 +29,7 @@ struct Section {
 }
 
 impl LowPass {
-    /// A filter for samples at `rate_hz` whose single pass has half power at `cutoff_hz`.
+    /// Returns a filter for samples at `rate_hz` whose single pass has half power at `cutoff_hz`.
     ///
     /// # Errors
     /// [`IdentError::Option`] unless `0 < cutoff_hz < rate_hz / 2`.
@@ -63,7 +63,7 @@ impl LowPass {
         })
     }
 
-    /// The filtered signal, of the length of `signal`.
+    /// Returns the filtered signal, of the length of `signal`.
     ///
     /// # Errors
     /// [`IdentError::Shape`] if there are 15 samples or fewer.
@@ -114,7 +114,7 @@ impl LowPass {
     }
 }
 
-/// Central differences, (samples, joints), one-sided of second order at the ends.
+/// Returns the central differences, (samples, joints), one-sided of second order at the ends.
 ///
 /// # Errors
 /// [`IdentError::Shape`] if there are fewer than three samples.

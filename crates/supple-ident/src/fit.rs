@@ -178,7 +178,7 @@ pub fn fit_rows<const N: usize>(
     })
 }
 
-/// Prior mean and standard deviation of an effect's column.
+/// Returns the prior mean and standard deviation of an effect's column.
 fn effect_prior(column: &Column) -> Option<(f64, f64)> {
     match column {
         Column::Spring(_) => Some((0.0, 0.2)),
@@ -202,7 +202,7 @@ struct FitStage<'a> {
 type StageSolution = (DVector<f64>, Vec<ReducedSystem>, Vec<f64>, Option<f64>);
 
 impl FitStage<'_> {
-    /// One reduced system for each joint, over all parts.
+    /// Returns one reduced system for each joint, over all parts.
     fn blocks(&self, weights: Option<&[Vec<Vec<f64>>]>) -> Vec<ReducedSystem> {
         let joints = self.columns.identified_joints().len();
         let of_joint = |j: usize| {
@@ -267,7 +267,7 @@ impl FitStage<'_> {
         Ok((x, blocks, noise, gap))
     }
 
-    /// Prior mean and standard deviation of a rotor's inertia.
+    /// Returns the prior mean and standard deviation of a rotor's inertia.
     fn rotor_prior(&self, unknown: usize, column: &Column) -> Option<(f64, f64)> {
         let nominal = self.prior[unknown];
         let is_rotor = matches!(column, Column::Rotor(_)) && nominal > 0.0;
@@ -275,7 +275,7 @@ impl FitStage<'_> {
         Some((nominal, relative * nominal))
     }
 
-    /// Rows of the prior of effects and rotors.
+    /// Returns the rows of the prior of effects and rotors.
     fn effect_prior(&self) -> DMatrix<f64> {
         let known = self.used.iter().enumerate().filter_map(|(k, i)| {
             let column = &self.columns.list()[*i];
@@ -404,12 +404,12 @@ impl<const N: usize> Fit<N> {
         effect_rows::learned(&self.columns, &|column| self.value(column), config)
     }
 
-    /// Compliance between encoder and link of each joint \[rad/(N m)\]; zero where it is not identified.
+    /// Returns the compliance between encoder and link of each joint \[rad/(N m)\]; zero where it is not identified.
     pub fn compliance_rad_per_nm(&self) -> [f64; N] {
         core::array::from_fn(|j| effect_rows::COMPLIANCE_UNIT * self.value(Column::Compliance(j)))
     }
 
-    /// Torque scale of each joint relative to the common scale of all joints; zero where it is not identified.
+    /// Returns the torque scale of each joint relative to the common scale of all joints; zero where it is not identified.
     pub fn torque_scale(&self) -> [f64; N] {
         core::array::from_fn(|j| self.value(Column::TorqueScale(j)))
     }
@@ -426,17 +426,17 @@ impl<const N: usize> Fit<N> {
         friction
     }
 
-    /// The nominal arm: kinematics and prior.
+    /// Returns the nominal arm: kinematics and prior.
     pub fn nominal(&self) -> &Arm<N> {
         &self.nominal
     }
 
-    /// Number of column combinations that the data determine.
+    /// Returns the number of column combinations that the data determine.
     pub fn rank(&self) -> usize {
         self.base.rank()
     }
 
-    /// Condition number of the independent columns, scaled to unit length.
+    /// Returns the condition number of the independent columns, scaled to unit length.
     pub fn condition(&self) -> f64 {
         self.base.condition
     }
@@ -510,7 +510,7 @@ impl<const N: usize> Fit<N> {
         }
     }
 
-    /// Values of the base parameters, in the order of [`BaseParameters::text`].
+    /// Returns the values of the base parameters, in the order of [`BaseParameters::text`].
     pub fn base_parameters(&self) -> DVector<f64> {
         self.base.values(&self.x)
     }

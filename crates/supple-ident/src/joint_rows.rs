@@ -37,7 +37,7 @@ pub struct JointRows {
 }
 
 impl JointRows {
-    /// Rows of one joint in steady sliding.
+    /// Returns the rows of one joint in steady sliding.
     pub fn new(a: DMatrix<f64>, b: DVector<f64>, speed: Vec<f64>) -> JointRows {
         JointRows {
             travel_since_reversal_rad: vec![f64::INFINITY; speed.len()],
@@ -50,7 +50,7 @@ impl JointRows {
         }
     }
 
-    /// [`JointRows::reduced`] without weights, cached for the first speed.
+    /// Returns [`JointRows::reduced`] without weights, cached for the first speed.
     pub fn block(&self, slow_rad_per_s: f64) -> ReducedSystem {
         let make = || (slow_rad_per_s, self.reduced(slow_rad_per_s, None));
         let (speed, block) = self.cached.get_or_init(make);
@@ -60,7 +60,7 @@ impl JointRows {
         make().1
     }
 
-    /// Torques predicted from the motion alone, without those of known rotors \[N m\].
+    /// Returns the torques predicted from the motion alone, without those of known rotors \[N m\].
     pub fn predicted(&self, x: &DVector<f64>) -> DVector<f64> {
         let mut torque = &self.a * x;
         let Some(load) = &self.motor_load else {
@@ -76,20 +76,20 @@ impl JointRows {
         torque
     }
 
-    /// Predicted minus measured torques of the samples that are used \[N m\].
+    /// Returns the predicted minus measured torques of the samples that are used \[N m\].
     pub fn residual(&self, x: &DVector<f64>) -> Vec<f64> {
         let all = self.predicted(x) - &self.b;
         let pairs = all.iter().zip(&self.used);
         pairs.filter(|(_, used)| **used).map(|(r, _)| *r).collect()
     }
 
-    /// `b` of the samples that are used.
+    /// Returns `b` of the samples that are used.
     pub fn torques(&self) -> Vec<f64> {
         let pairs = self.b.iter().zip(&self.used);
         pairs.filter(|(_, used)| **used).map(|(b, _)| *b).collect()
     }
 
-    /// Samples `range`.
+    /// Returns the samples `range`.
     pub fn part(&self, range: std::ops::Range<usize>) -> JointRows {
         JointRows {
             a: self.a.rows_range(range.clone()).into_owned(),

@@ -30,7 +30,7 @@ pub struct Learning {
 }
 
 impl Default for Learning {
-    /// Samples above 0.08 rad/s, friction change of 20 %, no payload, noise of 0.05 N m.
+    /// Returns default options: samples above 0.08 rad/s, friction change of 20 %, no payload, noise of 0.05 N m.
     fn default() -> Self {
         Learning {
             slow_rad_per_s: 0.08,
@@ -158,7 +158,7 @@ pub fn learn<const N: usize>(
     Ok(learned)
 }
 
-/// Expected size of unknown `i`: relative friction change, payload mass, or first moment of that mass at 0.1 m.
+/// Returns the expected size of unknown `i`: relative friction change, payload mass, or first moment of that mass at 0.1 m.
 fn expected(learning: &Learning, joint_count: usize, i: usize) -> f64 {
     let payload_kg = learning.payload_kg.unwrap_or(1.0);
     match i.checked_sub(2 * joint_count) {

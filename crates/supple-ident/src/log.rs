@@ -44,8 +44,8 @@ impl Log {
         self.check_with_cutoff(dof, identified_joints, None)
     }
 
-    /// Does the same as [`Log::check`], but accepts gaps that are short relative to the period of the filter's cutoff \[Hz\], because
-    /// interpolation over them is accurate enough.
+    /// Does the same as [`Log::check`], but accepts gaps that are short relative to the period of the filter's cutoff \[Hz\],
+    /// because interpolation over them is accurate enough.
     ///
     /// # Errors
     /// As [`Log::check`].

@@ -98,7 +98,7 @@ fn motor_friction(columns: &Columns, x: &DVector<f64>, joint: usize) -> (f64, f6
     sums
 }
 
-/// Mass matrix of the parameters `x` at `q`, even if they are physically inconsistent \[kg m^2\].
+/// Returns the mass matrix of the parameters `x` at `q`, even if they are physically inconsistent \[kg m^2\].
 pub fn mass_matrix<const N: usize>(
     nominal: &Arm<N>,
     columns: &Columns,

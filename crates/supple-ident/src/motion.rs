@@ -30,7 +30,7 @@ pub struct Preparation {
 }
 
 impl Default for Preparation {
-    /// The log's own rate, cutoff at 8 Hz, every sample, no torque delay.
+    /// Returns default options: the log's own rate, cutoff at 8 Hz, every sample, no torque delay.
     fn default() -> Self {
         Self {
             rate_hz: None,
@@ -184,7 +184,7 @@ impl Motion {
         Ok(motion)
     }
 
-    /// Time of a sample \[s\], on the log's clock.
+    /// Returns the time of a sample \[s\], on the log's clock.
     pub fn time_s(&self, sample: usize) -> f64 {
         self.start_s + sample as f64 / self.rate_hz
     }
@@ -199,12 +199,12 @@ impl Motion {
         !self.excluded_intervals.iter().any(covers)
     }
 
-    /// Number of samples.
+    /// Returns the number of samples.
     pub fn samples(&self) -> usize {
         self.q.nrows()
     }
 
-    /// The samples `range`, at the same rate.
+    /// Returns the samples `range`, at the same rate.
     pub fn part(&self, range: std::ops::Range<usize>) -> Motion {
         let cut = |m: &DMatrix<f64>| m.rows_range(range.clone()).into_owned();
         Motion {

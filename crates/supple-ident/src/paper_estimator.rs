@@ -49,7 +49,7 @@ pub fn with_psi(known: &Parameters, psi: &[f64; 12]) -> Parameters {
     }
 }
 
-/// Twelve-column regressor of one state and the contribution of `m3` and `S`: `tau = lambda psi + rest`.
+/// Returns the twelve-column regressor of one state and the contribution of `m3` and `S`: `tau = lambda psi + rest`.
 pub fn lambda(
     known: &Parameters,
     q: &Vector<3>,

@@ -87,7 +87,7 @@ pub struct Procedure {
 }
 
 impl Default for Procedure {
-    /// All joints, cutoff of 8 Hz at the log's own rate, physically consistent, friction and prior by
+    /// Returns default options: all joints, cutoff of 8 Hz at the log's own rate, physically consistent, friction and prior by
     /// cross-validation, rotors identified, no sample excluded, delay of the torques estimated.
     fn default() -> Self {
         Procedure {
@@ -158,7 +158,7 @@ pub fn identify_motions<const N: usize>(
     Ok(found)
 }
 
-/// Upper median of the torque delays of the fitted motions, used to prepare validation logs.
+/// Returns the upper median of the torque delays of the fitted motions, used to prepare validation logs.
 fn median_delay_s(motions: &[Motion]) -> f64 {
     let mut all: Vec<f64> = motions.iter().map(|m| m.torque_delay_s).collect();
     all.sort_by(f64::total_cmp);

@@ -16,7 +16,7 @@ pub struct ReducedSystem {
 }
 
 impl ReducedSystem {
-    /// A system without rows, for `columns` unknowns.
+    /// Returns a system without rows, for `columns` unknowns.
     pub fn empty(columns: usize) -> ReducedSystem {
         ReducedSystem {
             stacked: DMatrix::zeros(0, columns + 1),
@@ -29,22 +29,22 @@ impl ReducedSystem {
         self.append(&(&other.stacked * scale), other.rows);
     }
 
-    /// Number of rows of the original problem.
+    /// Returns the number of rows of the original problem.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// `R_1`.
+    /// Returns `R_1`.
     pub fn a(&self) -> DMatrix<f64> {
         self.stacked.columns(0, self.unknowns()).into_owned()
     }
 
-    /// `r`.
+    /// Returns `r`.
     pub fn b(&self) -> DVector<f64> {
         self.stacked.column(self.unknowns()).into_owned()
     }
 
-    /// The same problem with some of its unknowns only.
+    /// Returns the same problem with some of its unknowns only.
     pub fn select(&self, unknowns: &[usize]) -> ReducedSystem {
         let columns: Vec<usize> = unknowns.iter().copied().chain([self.unknowns()]).collect();
         ReducedSystem {
@@ -53,18 +53,18 @@ impl ReducedSystem {
         }
     }
 
-    /// `|A x - b|^2`.
+    /// Returns `|A x - b|^2`.
     pub fn error_squared(&self, x: &DVector<f64>) -> f64 {
         (self.stacked.columns(0, self.unknowns()) * x - self.stacked.column(self.unknowns()))
             .norm_squared()
     }
 
-    /// `|b|^2`.
+    /// Returns `|b|^2`.
     pub fn torque_squared(&self) -> f64 {
         self.stacked.column(self.unknowns()).norm_squared()
     }
 
-    /// Number of unknowns.
+    /// Returns the number of unknowns.
     pub fn unknowns(&self) -> usize {
         self.stacked.ncols() - 1
     }

@@ -13,8 +13,8 @@ use supple_core::friction::LoadTorque;
 use supple_core::math::exp;
 use supple_core::{Arm, Friction, Vector};
 
-/// Regressor of one state, (identified joints, columns). Other joints count as held at rest, independent of `qd` and `qdd`. The
-/// motor torques are assumed to be those that the links of `arm` need.
+/// Returns the regressor of one state, (identified joints, columns). Other joints count as held at rest, independent of `qd` and
+/// `qdd`. The motor torques are assumed to be those that the links of `arm` need.
 pub fn rows<const N: usize>(
     arm: &Arm<N>,
     columns: &Columns,
@@ -103,7 +103,7 @@ pub(crate) fn rows_under_load<const N: usize>(
     rows
 }
 
-/// Dry friction of 1 N m in the band of the columns.
+/// Returns the dry friction of 1 N m in the band of the columns.
 fn unit_dry_friction(columns: &Columns) -> Friction {
     Friction {
         band_rad_per_s: columns.friction().band_rad_per_s,
@@ -111,7 +111,7 @@ fn unit_dry_friction(columns: &Columns) -> Friction {
     }
 }
 
-/// Travel of joint `j` since its last reversal, for each sample.
+/// Returns the travel of joint `j` since its last reversal, for each sample.
 fn travel_since_reversal(motion: &Motion, j: usize) -> Vec<f64> {
     let (mut travel, mut direction) = (0.0, 0.0_f64);
     let step_s = 1.0 / motion.rate_hz;

@@ -36,7 +36,7 @@ pub struct RippleSearch {
 }
 
 impl Default for RippleSearch {
-    /// The first eight harmonics, joints below 0.2 rad/s.
+    /// Returns default options: the first eight harmonics, joints below 0.2 rad/s.
     fn default() -> Self {
         RippleSearch {
             harmonics: (1..=8).collect(),

@@ -18,7 +18,7 @@ use supple_core::friction::LoadTorque;
 /// Relative tolerance within which candidates count as equally good.
 const TIE: f64 = 0.005;
 
-/// Friction models from none to the richest, with all other options as in `base`.
+/// Returns the friction models from none to the richest, with all other options as in `base`.
 pub fn friction_candidates(base: &Options) -> Vec<Candidate> {
     let viscous = FrictionColumns {
         viscous: true,
@@ -58,8 +58,8 @@ pub fn friction_candidates(base: &Options) -> Vec<Candidate> {
     shapes.into_iter().map(candidate).collect()
 }
 
-/// Coulomb friction independent of load, growing with the joint's load, and growing with the motor's torque; empty without
-/// Coulomb friction.
+/// Returns the Coulomb friction independent of load, growing with the joint's load, and growing with the motor's torque; empty
+/// without Coulomb friction.
 pub fn load_candidates(base: &Options) -> Vec<Candidate> {
     if !base.friction.coulomb {
         return Vec::new();
@@ -143,7 +143,7 @@ pub fn effects_candidates(base: &Options, effects: &Effects) -> Vec<Candidate> {
     .to_vec()
 }
 
-/// Weights of the prior from large to small, with all other options as in `base`.
+/// Returns the weights of the prior from large to small, with all other options as in `base`.
 pub fn prior_candidates(base: &Options) -> Vec<Candidate> {
     let candidate = |weight: f64| Candidate {
         name: format!("prior {weight}"),

@@ -56,7 +56,7 @@ pub fn fit_with_stribeck<const N: usize>(
     Ok(found)
 }
 
-/// Sum of squared residuals of slow, steady sliding outside the band, after subtraction of each joint's mean.
+/// Returns the sum of squared residuals of slow, steady sliding outside the band, after subtraction of each joint's mean.
 fn slow_error<const N: usize>(found: &Fit<N>, motions: &[Motion]) -> Result<f64, IdentError> {
     let slow = found.columns.friction().band_rad_per_s..=SLOW_RAD_PER_S;
     let mut total = 0.0;

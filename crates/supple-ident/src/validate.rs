@@ -78,7 +78,7 @@ impl<const N: usize> Fit<N> {
         })
     }
 
-    /// Predicted torques of the identified joints, (samples, identified joints), with dry friction filtered like the
+    /// Returns the predicted torques of the identified joints, (samples, identified joints), with dry friction filtered like the
     /// measured torques \[N m\].
     ///
     /// # Errors
@@ -147,7 +147,7 @@ pub fn verdict(held_out: &[(String, &Validation)], joints: &[String]) -> String 
 }
 
 impl Validation {
-    /// Verdict as text: whether a controller can use the model, and if not, why.
+    /// Returns the verdict as text: whether a controller can use the model, and if not, why.
     pub fn verdict(&self) -> String {
         let percent = 100.0 * self.positive_definite;
         let error = 100.0 * self.total_relative;

@@ -27,7 +27,7 @@ pub(crate) fn decode<'a, T: Deserialize<'a>>(data: &'a [u8]) -> Result<T, String
     Ok(value)
 }
 
-/// The values after the encapsulation header.
+/// Returns the values after the encapsulation header.
 pub(crate) fn values(data: &[u8]) -> Result<&[u8], String> {
     let values = data.strip_prefix(&ENCAPSULATION);
     values.ok_or_else(|| "not plain little-endian CDR".to_owned())

@@ -87,7 +87,7 @@ impl Definitions {
         Ok(())
     }
 
-    /// Nesting depth from `name` on, itself included. `above` is the number of enclosing messages; `depths` caches
+    /// Returns the nesting depth from `name` on, itself included. `above` is the number of enclosing messages; `depths` caches
     /// results.
     fn depth<'a>(
         &'a self,

@@ -52,7 +52,7 @@ impl Topic {
     /// Number of channels.
     pub const COUNT: usize = 9;
 
-    /// Topic, package and type.
+    /// Returns the topic, package and type.
     fn names(self) -> (&'static str, &'static str, &'static str) {
         match self {
             Topic::ControllerState => ("/controller_state", "supple_msgs", "ControllerState"),
@@ -88,7 +88,7 @@ impl Topic {
 
 /// Receiver of messages: a log or a live viewer.
 pub(crate) trait MessageSink {
-    /// Buffer for the words of a record.
+    /// Returns the buffer for the words of a record.
     fn words(&mut self) -> &mut Vec<u64>;
 
     /// Receives a message of step number `step`.
@@ -172,7 +172,7 @@ pub(crate) fn emit<const N: usize>(
     Ok(())
 }
 
-/// The link that no joint moves.
+/// Returns the link that no joint moves.
 pub(crate) fn base_frame(description: &Description, home_rad: &[f64]) -> Result<String, LogError> {
     let transforms = description.transforms(home_rad)?;
     let is_child = |name: &str| transforms.iter().any(|t| t.child == name);

@@ -108,7 +108,7 @@ impl LogFile {
         written.map_err(|error| write_error(&self.part, error))
     }
 
-    /// Number of a channel; the channel is written before its first message.
+    /// Returns the number of a channel; the channel is written before its first message.
     pub fn channel(&mut self, channel: &Channel) -> Result<u16, LogError> {
         let schema = &channel.schema;
         let added = if schema.name.is_empty() {
@@ -141,7 +141,7 @@ impl LogFile {
         flushed.map_err(|error| write_error(&self.part, error))
     }
 
-    /// Error for a value that cannot be encoded.
+    /// Returns the error for a value that cannot be encoded.
     pub fn unwritable(
         &self,
         error: impl Into<Box<dyn std::error::Error + Send + Sync>>,

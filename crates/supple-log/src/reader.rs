@@ -89,12 +89,12 @@ impl Reader {
         })
     }
 
-    /// Path of the file.
+    /// Returns the path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Metadata of the log.
+    /// Returns the metadata of the log.
     pub fn metadata(&self) -> &LogMetadata {
         &self.metadata
     }
@@ -104,7 +104,7 @@ impl Reader {
         &self.attachments
     }
 
-    /// The arm, from the URDF and the TOML inside.
+    /// Returns the arm, from the URDF and the TOML inside.
     ///
     /// # Errors
     /// [`LogError::Format`] if one is missing, [`LogError::Model`] if one is invalid.

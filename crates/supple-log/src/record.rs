@@ -70,7 +70,7 @@ pub(crate) fn terms_definition() -> String {
     text
 }
 
-/// Names of the numbers of a field that holds codes.
+/// Returns the names of the numbers of a field that holds codes.
 fn constants(field: &str) -> Vec<(String, u8)> {
     let named = |all: &[codes::Code]| {
         let owned = |code: &codes::Code| (code.name.to_uppercase(), code.number);

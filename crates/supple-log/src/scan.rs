@@ -83,7 +83,7 @@ impl LogScanner {
         })
     }
 
-    /// Name of the file in messages.
+    /// Returns the name of the file in messages.
     pub fn file(&self) -> &str {
         &self.file
     }
@@ -93,7 +93,7 @@ impl LogScanner {
         self.complete_bytes
     }
 
-    /// The next item; `None` at the end of a complete file.
+    /// Returns the next item; `None` at the end of a complete file.
     ///
     /// # Errors
     /// [`LogError::Incomplete`] if the file is truncated or damaged, then `None`; [`LogError::Format`] if it is not an

@@ -260,7 +260,7 @@ pub(crate) struct LimitsDef<const N: usize> {
     damping_n_s_per_m: f64,
 }
 
-/// Acceleration and jerk limits of logs that were written before these limits existed: the maximum that the
+/// Returns the acceleration and jerk limits of logs that were written before these limits existed: the maximum that the
 /// controller accepts.
 fn max_rate() -> f64 {
     1e3

@@ -120,7 +120,7 @@ impl<'a> Values<'a> {
         }
     }
 
-    /// The length of a sequence.
+    /// Returns the length of a sequence.
     pub fn length(&mut self) -> Result<u32, String> {
         self.read()
     }

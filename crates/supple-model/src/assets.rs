@@ -32,7 +32,7 @@ const NAMES: [&str; ASSETS.len()] = {
     names
 };
 
-/// Names of the built-in arms.
+/// Returns the names of the built-in arms.
 ///
 /// - `openarm`: OpenArm 1.0, the right arm, seven Damiao motors; upper arm roll and wrist held.
 /// - `paper3`: the physically consistent arm closest to the paper's identified parameters, three joints.
@@ -44,7 +44,7 @@ pub fn assets() -> &'static [&'static str] {
     &NAMES
 }
 
-/// TOML and URDF of a built-in arm.
+/// Returns the TOML and URDF of a built-in arm.
 pub(crate) fn text(name: &str) -> Result<(&'static str, &'static str), ModelError> {
     let found = ASSETS.iter().find(|(asset, ..)| *asset == name);
     found

@@ -84,7 +84,7 @@ impl Parameters {
         g_m_per_s2: 9.81,
     };
 
-    /// `Psi` of the linear form, in the order of [`Parameters::PSI_NAMES`].
+    /// Returns `Psi` of the linear form, in the order of [`Parameters::PSI_NAMES`].
     pub fn psi(&self) -> [f64; 12] {
         let [v1, v2, v3] = self.viscous_nm_s_per_rad;
         [
@@ -147,7 +147,7 @@ impl Parameters {
         })
     }
 
-    /// `H(q)` \[kg m^2\].
+    /// Returns `H(q)` \[kg m^2\].
     pub fn mass_matrix(&self, q: &Vector<3>) -> Matrix3<f64> {
         let t = Angles::of(q);
         let coupling = self.l2_m * self.m3r3_kg_m;
@@ -164,7 +164,7 @@ impl Parameters {
         Matrix3::new(h11, 0.0, 0.0, 0.0, h22, h23, 0.0, h23, h33)
     }
 
-    /// `C(q, qd)` of the Christoffel symbols of `H`: `H' - 2 C` is skew \[kg m^2/s\].
+    /// Returns `C(q, qd)` of the Christoffel symbols of `H`: `H' - 2 C` is skew \[kg m^2/s\].
     pub fn coriolis_matrix(&self, q: &Vector<3>, qd: &Vector<3>) -> Matrix3<f64> {
         let slopes = self.mass_matrix_slopes(q);
         Matrix3::from_fn(|i, j| {
@@ -173,12 +173,12 @@ impl Parameters {
         })
     }
 
-    /// `C(q, qd) qd` \[N m\].
+    /// Returns `C(q, qd) qd` \[N m\].
     pub fn coriolis(&self, q: &Vector<3>, qd: &Vector<3>) -> Vector<3> {
         self.coriolis_matrix(q, qd) * qd
     }
 
-    /// `G(q)` \[N m\].
+    /// Returns `G(q)` \[N m\].
     pub fn gravity(&self, q: &Vector<3>) -> Vector<3> {
         let t = Angles::of(q);
         let forearm = self.m3r3_kg_m * t.c23;
@@ -186,12 +186,12 @@ impl Parameters {
         Vector::<3>::new(0.0, shoulder, forearm) * self.g_m_per_s2
     }
 
-    /// `H qdd + C qd + G`, without friction \[N m\].
+    /// Returns `H qdd + C qd + G`, without friction \[N m\].
     pub fn inverse_dynamics(&self, q: &Vector<3>, qd: &Vector<3>, qdd: &Vector<3>) -> Vector<3> {
         self.mass_matrix(q) * qdd + self.coriolis(q, qd) + self.gravity(q)
     }
 
-    /// Position of the tip \[m\].
+    /// Returns the position of the tip \[m\].
     pub fn tip(&self, q: &Vector<3>) -> Vector3<f64> {
         let t = Angles::of(q);
         let (s1, c1) = sin_cos(q[0]);
@@ -242,7 +242,7 @@ impl Parameters {
         ]
     }
 
-    /// `dH/dq_k`, for each joint.
+    /// Returns `dH/dq_k`, for each joint.
     fn mass_matrix_slopes(&self, q: &Vector<3>) -> [Matrix3<f64>; 3] {
         let t = Angles::of(q);
         let coupling = self.l2_m * self.m3r3_kg_m;

@@ -15,7 +15,7 @@ pub struct UrdfArgs {
 }
 
 impl UrdfArgs {
-    /// The arm's name with the tip, as all programs read it. The two flags have no effect on other arms than a URDF.
+    /// Returns the arm's name with the tip, as all programs read it. The two flags have no effect on other arms than a URDF.
     pub fn name(&self, arm: &str) -> String {
         match UrdfName::parse(arm) {
             Some(mut name) => {

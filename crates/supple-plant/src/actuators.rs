@@ -80,7 +80,7 @@ pub struct ActuatorModel<const N: usize> {
 }
 
 impl<const N: usize> ActuatorModel<N> {
-    /// Ideal direct drive: ratio 1, no quantisation, no delay.
+    /// Returns the ideal direct drive: ratio 1, no quantisation, no delay.
     pub fn direct() -> ActuatorModel<N> {
         ActuatorModel {
             joint_from_motor: Matrix::identity(),
@@ -130,7 +130,7 @@ pub(crate) struct ActuatorState<const N: usize> {
 }
 
 impl<const N: usize> ActuatorState<N> {
-    /// `held` is the joint torque that acts until the first command takes effect.
+    /// Creates the actuators; `held` is the joint torque that acts until the first command takes effect.
     pub fn new(model: ActuatorModel<N>, held: &Vector<N>) -> Result<Self, PlantError> {
         let motor_from_joint = inverse(&model.joint_from_motor).ok_or(PlantError::Transmission)?;
         for i in 0..N {
@@ -255,7 +255,7 @@ impl<const N: usize> ActuatorState<N> {
             * self.motor_from_joint;
     }
 
-    /// Joint torque of the shorted motors at joint velocities `qd`.
+    /// Returns the joint torque of the shorted motors at joint velocities `qd`.
     pub fn braking(&self, qd: &Vector<N>) -> Vector<N> {
         if self.shorted.contains(&true) {
             -(self.braking * qd)
@@ -264,8 +264,8 @@ impl<const N: usize> ActuatorState<N> {
         }
     }
 
-    /// Torque of the motors at the joints for the acting command `applied`, with motor angles that are `q` at the joints;
-    /// without the braking of shorted motors.
+    /// Returns the torque of the motors at the joints for the acting command `applied`, with motor angles that are `q` at the
+    /// joints; without the braking of shorted motors.
     pub fn motor_torque(&self, applied: &Vector<N>, q: &Vector<N>) -> Vector<N> {
         if !self.amplifiers_inexact {
             return applied + self.ripple(q);
@@ -290,7 +290,7 @@ impl<const N: usize> ActuatorState<N> {
         self.motor_from_joint.transpose() * motor + self.ripple(q)
     }
 
-    /// Joint torque of the motors' cogging with motor angles that are `q` at the joints.
+    /// Returns the joint torque of the motors' cogging with motor angles that are `q` at the joints.
     fn ripple(&self, q: &Vector<N>) -> Vector<N> {
         if self.model.ripple.is_empty() {
             return Vector::zeros();
@@ -304,7 +304,7 @@ impl<const N: usize> ActuatorState<N> {
         self.motor_from_joint.transpose() * motor
     }
 
-    /// Joint angles as measured by the encoders, with motor angles that are `q` at the joints.
+    /// Returns the joint angles as measured by the encoders, with motor angles that are `q` at the joints.
     pub fn measure(&self, q: &Vector<N>, noise: &mut Noise) -> Vector<N> {
         let counts = &self.model.counts_per_motor_revolution;
         let deviation = &self.model.encoder_noise_rad;
@@ -325,12 +325,12 @@ impl<const N: usize> ActuatorState<N> {
     }
 }
 
-/// Motor angles from joint angles; `None` for a singular transmission.
+/// Returns the motor angles from joint angles; `None` for a singular transmission.
 pub(crate) fn motor_from_joint<const N: usize>(model: &ActuatorModel<N>) -> Option<Matrix<N, N>> {
     inverse(&model.joint_from_motor)
 }
 
-/// Inverse by the normal equations, `(A^T A)^-1 A^T`; `None` for a singular matrix.
+/// Returns the inverse by the normal equations, `(A^T A)^-1 A^T`; `None` for a singular matrix.
 fn inverse<const N: usize>(a: &Matrix<N, N>) -> Option<Matrix<N, N>> {
     let factor = linalg::Cholesky::new(&(a.transpose() * a))?;
     let inverse = factor.solve(&a.transpose());

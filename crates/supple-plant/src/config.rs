@@ -33,7 +33,7 @@ impl<const N: usize> HardStops<N> {
         }
     }
 
-    /// Torque of the stop on joint `i` at `q` \[rad\], `qd` \[rad/s\] \[N m\].
+    /// Returns the torque of the stop on joint `i` at `q` \[rad\], `qd` \[rad/s\] \[N m\].
     pub(crate) fn torque_nm(&self, i: usize, q: f64, qd: f64) -> f64 {
         let (below, above) = (self.lower_rad[i] - q, q - self.upper_rad[i]);
         let push = |depth: f64, rate: f64| {
@@ -134,7 +134,7 @@ pub struct PlantConfig<const N: usize> {
 }
 
 impl<const N: usize> PlantConfig<N> {
-    /// Ideal arm: no friction, scene or stops, exact encoders, exact torques without delay.
+    /// Returns the ideal arm: no friction, scene or stops, exact encoders, exact torques without delay.
     pub fn ideal(arm: Arm<N>) -> PlantConfig<N> {
         PlantConfig {
             arm,

@@ -34,7 +34,7 @@ pub struct Material {
 }
 
 impl Material {
-    /// A hard cap on wood: 15 to 22 N through a 100 Hz filter and 4 ms of contact for 1.0 to 1.5 kg at
+    /// Returns a hard cap on wood: 15 to 22 N through a 100 Hz filter and 4 ms of contact for 1.0 to 1.5 kg at
     /// 0.04 m/s.
     pub fn wood() -> Material {
         Material {
@@ -45,7 +45,7 @@ impl Material {
         }
     }
 
-    /// A hard cap on a rubber sheet: about 15 ms of contact.
+    /// Returns a hard cap on a rubber sheet: about 15 ms of contact.
     pub fn rubber() -> Material {
         Material {
             name: "rubber".to_owned(),
@@ -55,7 +55,7 @@ impl Material {
         }
     }
 
-    /// `F` \[N\] at penetration `depth_m` and rate `depth_rate_m_per_s`; zero without contact.
+    /// Returns `F` \[N\] at penetration `depth_m` and rate `depth_rate_m_per_s`; zero without contact.
     pub fn normal_force_n(&self, depth_m: f64, depth_rate_m_per_s: f64) -> f64 {
         if depth_m <= 0.0 {
             return 0.0;
@@ -109,7 +109,7 @@ impl Bristle {
     }
 }
 
-/// `v`, scaled down to length `limit` if longer.
+/// Returns `v`, scaled down to length `limit` if longer.
 fn clamped(v: &Vector3<f64>, limit: f64) -> Vector3<f64> {
     let length = libm::sqrt(v.dot(v));
     if length > limit {

@@ -12,7 +12,7 @@ use supple_model::{Description, ModelError};
 const SHORTED_TIME_CONSTANT_S: f64 = 2e-3;
 
 impl<const N: usize> PlantConfig<N> {
-    /// Plant of a description, in empty space: arm and tool, friction (with Stribeck effect and a load-dependent
+    /// Returns the plant of a description, in empty space: arm and tool, friction (with Stribeck effect and a load-dependent
     /// part, see [`LuGre::from_friction`]), motors with ripple, encoders, a torque delay of one cycle, hard stops
     /// and the radius of the tip. The force sensor is noiseless.
     ///

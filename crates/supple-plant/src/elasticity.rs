@@ -126,12 +126,12 @@ impl<const N: usize> Rotors<N> {
         });
     }
 
-    /// Motor angles and velocities, seen at the joints.
+    /// Returns the motor angles and velocities, seen at the joints.
     pub fn state(&self) -> (Vector<N>, Vector<N>) {
         (self.position_rad, self.velocity_rad_per_s)
     }
 
-    /// Torques on the joints over a step from `q`, `qd`, in which `motor_nm` acts on the rotors.
+    /// Returns the torques on the joints over a step from `q`, `qd`, in which `motor_nm` acts on the rotors.
     pub fn torque(
         &mut self,
         (q, qd): (&Vector<N>, &Vector<N>),
@@ -183,7 +183,7 @@ impl<const N: usize> Rotors<N> {
         }
     }
 
-    /// Potential energy of the springs with joints at `q`, and kinetic energy of the rotors \[J\].
+    /// Returns the potential energy of the springs with joints at `q`, and kinetic energy of the rotors \[J\].
     pub fn energy_j(&self, q: &Vector<N>) -> (f64, f64) {
         let (mut potential, mut kinetic) = (0.0, 0.0);
         for (i, spring) in self.joints.iter().enumerate() {

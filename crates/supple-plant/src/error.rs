@@ -36,7 +36,7 @@ pub enum PlantError {
     Scene(#[from] SceneError),
 }
 
-/// `Ok` if `valid` holds, the entry's error otherwise.
+/// Returns `Ok` if `valid` holds, the entry's error otherwise.
 pub(crate) fn entry(
     valid: bool,
     name: impl Into<String>,

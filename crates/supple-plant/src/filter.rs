@@ -27,7 +27,7 @@ pub struct Butterworth {
 }
 
 impl Butterworth {
-    /// Filter with a gain of -3 dB at `cutoff_hz`; `sample_s` is the sampling period.
+    /// Returns the filter with a gain of -3 dB at `cutoff_hz`; `sample_s` is the sampling period.
     ///
     /// # Errors
     /// [`PlantError`] if the cutoff is not positive and below half the sampling rate.
@@ -86,7 +86,7 @@ mod tests {
         }
     }
 
-    /// Steady amplitude of a sinusoid through the filter at the plant's default step.
+    /// Returns the steady amplitude of a sinusoid through the filter at the plant's default step.
     fn gain(hz: f64) -> f64 {
         let step_s = 2e-4;
         let mut filter = Butterworth::new(100.0, step_s).unwrap();

@@ -58,7 +58,7 @@ impl LuGre {
         load_fraction: 0.0,
     };
 
-    /// Friction that equals `friction` in steady sliding outside its band: the same `V`, `S`, `v_s` and
+    /// Returns the friction that equals `friction` in steady sliding outside its band: the same `V`, `S`, `v_s` and
     /// offset. Its Stribeck effect is kept; without one, breakaway is [`BREAKAWAY_FACTOR`] `S`. The load
     /// fraction is [`LOAD_FRACTION`].
     pub fn from_friction(friction: &Friction) -> LuGre {
@@ -81,7 +81,7 @@ impl LuGre {
         }
     }
 
-    /// The same friction without the part that depends on load and direction.
+    /// Returns the same friction without the part that depends on load and direction.
     pub fn without_load(self) -> LuGre {
         LuGre {
             load_fraction: 0.0,
@@ -89,7 +89,7 @@ impl LuGre {
         }
     }
 
-    /// Torque of steady sliding at `velocity_rad_per_s` under `load` in 0..1 \[N m\], positive against
+    /// Returns the torque of steady sliding at `velocity_rad_per_s` under `load` in 0..1 \[N m\], positive against
     /// positive motion. At rest only the offset.
     pub fn steady_torque_nm(&self, velocity_rad_per_s: f64, load: f64) -> f64 {
         let v = velocity_rad_per_s;
@@ -97,7 +97,7 @@ impl LuGre {
         self.viscous_nm_s_per_rad * v + self.offset_nm + sign * self.sliding_nm(v, load)
     }
 
-    /// `g(v)`.
+    /// Returns `g(v)`.
     fn sliding_nm(&self, v: f64, load: f64) -> f64 {
         let s = v / self.stribeck_rad_per_s;
         let dip = (self.breakaway_nm - self.coulomb_nm) * libm::exp(-s * s);
@@ -119,8 +119,8 @@ impl LuGre {
         self.advance_scaled(deflection_rad, velocity_rad_per_s, load, scale, dt_s)
     }
 
-    /// Does the same as [`LuGre::advance`], with dry and viscous friction multiplied by `scale`; stiffness and damping of the bristle
-    /// are unchanged.
+    /// Does the same as [`LuGre::advance`], with dry and viscous friction multiplied by `scale`; stiffness and damping of the
+    /// bristle are unchanged.
     pub fn advance_scaled(
         &self,
         deflection_rad: &mut f64,

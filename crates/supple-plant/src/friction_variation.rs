@@ -57,7 +57,7 @@ pub struct FrictionVariation<const N: usize> {
 }
 
 impl<const N: usize> FrictionVariation<N> {
-    /// Constant friction.
+    /// Returns the constant friction.
     pub fn none() -> FrictionVariation<N> {
         FrictionVariation {
             angle_fraction: 0.0,
@@ -85,8 +85,8 @@ impl<const N: usize> FrictionVariation<N> {
         }
     }
 
-    /// Factor of dry and viscous friction of `joint` from its angle `angle_rad` and its direction of motion, at `speed` in
-    /// units of its Stribeck speed.
+    /// Returns the factor of dry and viscous friction of `joint` from its angle `angle_rad` and its direction of motion, at
+    /// `speed` in units of its Stribeck speed.
     pub fn factor(&self, joint: usize, angle_rad: f64, speed: f64) -> f64 {
         let mut factor = 1.0;
         if self.angle_fraction != 0.0 {
@@ -99,7 +99,7 @@ impl<const N: usize> FrictionVariation<N> {
         factor
     }
 
-    /// Factor of the viscous friction of a joint with this load, 0 to 1, at `speed` in units of its Stribeck speed.
+    /// Returns the factor of the viscous friction of a joint with this load, 0 to 1, at `speed` in units of its Stribeck speed.
     pub fn viscous_load_factor(&self, load: f64, speed: f64) -> f64 {
         1.0 + self.viscous_load_fraction * load * (2.0 + speed.clamp(-1.0, 1.0)) / 3.0
     }

@@ -182,7 +182,7 @@ impl HandState {
         }
     }
 
-    /// Force on the tip \[N\] at its position \[m\] and velocity \[m/s\].
+    /// Returns the force on the tip \[N\] at its position \[m\] and velocity \[m/s\].
     pub fn force_n(
         &mut self,
         time_s: f64,

@@ -19,7 +19,7 @@ pub(crate) struct JointFrictions<const N: usize> {
 }
 
 impl<const N: usize> JointFrictions<N> {
-    /// Relaxed bristles.
+    /// Returns the relaxed bristles.
     pub fn new(config: &PlantConfig<N>, motor_from_joint: Matrix<N, N>) -> JointFrictions<N> {
         let loaded = config.friction.iter().any(|f| f.load_fraction > 0.0);
         let at_motors = config.motor_friction != [LuGre::NONE; N];
@@ -121,7 +121,7 @@ impl<const N: usize> Load<N> {
         }
     }
 
-    /// Load of each joint, 0 to 1, with the joint frames `poses`.
+    /// Returns the load of each joint, 0 to 1, with the joint frames `poses`.
     pub fn relative(&self, poses: &[Pose; N]) -> Vector<N> {
         let mut load = Vector::zeros();
         let (mut mass, mut moment) = (0.0, Vector3::zeros());
@@ -139,7 +139,7 @@ impl<const N: usize> Load<N> {
     }
 }
 
-/// Moment on each joint if all links beyond it formed a horizontal line: mass times gravity times the length of
+/// Returns the moment on each joint if all links beyond it formed a horizontal line: mass times gravity times the length of
 /// the chain.
 fn load_bound<const N: usize>(arm: &Arm<N>) -> Vector<N> {
     let gravity = libm::sqrt(arm.gravity().dot(&arm.gravity()));

@@ -15,7 +15,7 @@ pub struct Noise {
 }
 
 impl Noise {
-    /// The stream number `stream` of `seed`. Different streams of one seed are independent.
+    /// Returns the stream number `stream` of `seed`. Different streams of one seed are independent.
     pub fn new(seed: u64, stream: u64) -> Noise {
         let mut noise = Noise {
             state: 0,

@@ -202,7 +202,7 @@ impl<const N: usize> Plant<N> {
         Ok(())
     }
 
-    /// Kinetic energy of the arm with its rotors and payload \[J\].
+    /// Returns the kinetic energy of the arm with its rotors and payload \[J\].
     pub fn kinetic_energy_j(&self) -> f64 {
         let truth = &self.truth;
         let qd = &truth.velocity_rad_per_s;
@@ -217,23 +217,23 @@ impl<const N: usize> Plant<N> {
         energy_j - at_joints + rotors.energy_j(&truth.position_rad).1
     }
 
-    /// Potential energy of elastic cables or gears \[J\]; zero for a rigid transmission.
+    /// Returns the potential energy of elastic cables or gears \[J\]; zero for a rigid transmission.
     pub fn elastic_energy_j(&self) -> f64 {
         let rotors = self.rotors.as_ref();
         rotors.map_or(0.0, |rotors| rotors.energy_j(&self.truth.position_rad).0)
     }
 
-    /// Largest contact force on the tip in all steps since the last call, base axes \[N\].
+    /// Returns the largest contact force on the tip in all steps since the last call, base axes \[N\].
     pub fn take_max_force_n(&mut self) -> Vector3<f64> {
         core::mem::take(&mut self.max_force_n)
     }
 
-    /// The measurement at the end of the last cycle, or at the start.
+    /// Returns the measurement at the end of the last cycle, or at the start.
     pub fn measurement(&self) -> &Measurement<N> {
         &self.measurement
     }
 
-    /// Ground truth at the end of the last cycle, or at the start.
+    /// Returns the ground truth at the end of the last cycle, or at the start.
     pub fn truth(&self) -> &Truth<N> {
         &self.truth
     }
@@ -243,12 +243,12 @@ impl<const N: usize> Plant<N> {
         &self.steps
     }
 
-    /// Configuration of the plant, with any added payload.
+    /// Returns the configuration of the plant, with any added payload.
     pub fn config(&self) -> &PlantConfig<N> {
         &self.config
     }
 
-    /// Current joint frames, `base_from_joint`.
+    /// Returns the current joint frames, `base_from_joint`.
     pub fn joint_poses(&self) -> &[Pose; N] {
         &self.poses
     }
@@ -258,7 +258,7 @@ impl<const N: usize> Plant<N> {
         self.world.objects()
     }
 
-    /// Load of each joint, 0 to 1: gravity moment on motor and bearings, relative to that of the horizontally
+    /// Returns the load of each joint, 0 to 1: gravity moment on motor and bearings, relative to that of the horizontally
     /// stretched arm.
     pub fn load(&self) -> Vector<N> {
         Load::new(&self.config.arm).relative(&self.poses)
@@ -299,7 +299,7 @@ impl<const N: usize> Plant<N> {
         }
     }
 
-    /// One step of the physics of `dt_s` under the commanded joint torque `applied`.
+    /// Runs one step of the physics of `dt_s` under the commanded joint torque `applied`.
     fn step(&mut self, applied: &Vector<N>, dt_s: f64) -> TipForce {
         let (q, qd) = (self.truth.position_rad, self.truth.velocity_rad_per_s);
         let (motor_q, motor_qd) = self.motor_state();
@@ -356,7 +356,7 @@ impl<const N: usize> Plant<N> {
         contact
     }
 
-    /// Angles and velocities of the motors, seen at the joints.
+    /// Returns the angles and velocities of the motors, seen at the joints.
     fn motor_state(&self) -> (Vector<N>, Vector<N>) {
         let truth = &self.truth;
         (truth.motor_position_rad, truth.motor_velocity_rad_per_s)
@@ -424,7 +424,7 @@ fn finite<const N: usize>(name: &str, values: &Vector<N>) -> Result<(), PlantErr
     }
 }
 
-/// The same arm with a ball of this mass and radius fixed to its tip.
+/// Returns the same arm with a ball of this mass and radius fixed to its tip.
 pub(crate) fn with_payload<const N: usize>(
     arm: &Arm<N>,
     mass_kg: f64,
@@ -434,7 +434,7 @@ pub(crate) fn with_payload<const N: usize>(
     with_last_link(arm, arm.body(N - 1).merged(&payload), arm.gravity())
 }
 
-/// The same arm with another last link and another gravity.
+/// Returns the same arm with another last link and another gravity.
 fn with_last_link<const N: usize>(
     arm: &Arm<N>,
     last: Body,

@@ -27,7 +27,7 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Set-point of each joint's position loop, if one is active \[rad\].
+    /// Returns the set-point of each joint's position loop, if one is active \[rad\].
     pub(super) fn joint_setpoints(&self, config: &Config<N>) -> [Option<f64>; N] {
         if let Activity::Breakaway { ramp, from_rad, .. } = &self.activity {
             return core::array::from_fn(|i| (i != ramp.joint).then_some(from_rad[i]));
@@ -40,7 +40,7 @@ impl<const N: usize> State<N> {
         })
     }
 
-    /// Set-points of the loops that hold or move every joint, if they are active \[rad\].
+    /// Returns the set-points of the loops that hold or move every joint, if they are active \[rad\].
     pub(super) fn loop_setpoints_rad(&self, config: &Config<N>) -> Option<Vector<N>> {
         if self.holds_pose() {
             return Some(self.held_setpoint_rad);
@@ -50,7 +50,7 @@ impl<const N: usize> State<N> {
         Some(reference.position_rad)
     }
 
-    /// Gains of the move mode in the pose of this cycle.
+    /// Returns the gains of the move mode in the pose of this cycle.
     fn move_gains(&self, controller: &Controller<N>) -> JointGains<N> {
         controller.move_gains(&self.terms.mass_matrix)
     }
@@ -113,7 +113,7 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Friction feed-forward that is frozen while contact blocks the arm, and shortly after.
+    /// Returns the friction feed-forward that is frozen while contact blocks the arm, and shortly after.
     pub(super) fn held_friction(&self, config: &Config<N>) -> Option<HeldFriction<'_, N>> {
         (config.latch.hold_friction && self.latch.held() > 0.0).then(|| HeldFriction {
             velocity_rad_per_s: &self.contact_velocity_rad_per_s,
@@ -147,7 +147,7 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Joint reference in the modes that move joints.
+    /// Returns the joint reference in the modes that move joints.
     pub(super) fn joint_reference(&self, config: &Config<N>) -> Option<JointReference<N>> {
         let time_s = self.activity_s(config);
         match &self.activity {
@@ -180,7 +180,7 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Model feed-forward along a joint reference.
+    /// Returns the model feed-forward along a joint reference.
     fn joint_feedforward(&self, reference: &JointReference<N>) -> Torques<N> {
         let velocity = &reference.velocity_rad_per_s;
         Torques {
@@ -192,7 +192,7 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Model feed-forward and a compliant spring and damper on each active joint. The spring's torque is at most
+    /// Returns the model feed-forward and a compliant spring and damper on each active joint. The spring's torque is at most
     /// [`JOINT_SPRING_SHARE`] of the joint's limit.
     fn joint_impedance_torques(&self, controller: &Controller<N>) -> Torques<N> {
         let config = controller.config();
@@ -215,7 +215,7 @@ impl<const N: usize> State<N> {
         torques
     }
 
-    /// The model alone: gravity, Coriolis and a share of the friction at the measured velocity.
+    /// Returns the model alone: gravity, Coriolis and a share of the friction at the measured velocity.
     fn float_torques(&self, controller: &Controller<N>) -> Torques<N> {
         let config = controller.config();
         let velocity = &self.estimator.velocity_rad_per_s;
@@ -233,7 +233,7 @@ impl<const N: usize> State<N> {
         torques
     }
 
-    /// Model feed-forward and stiff position loops along the joint reference; the joint of a
+    /// Returns the model feed-forward and stiff position loops along the joint reference; the joint of a
     /// breakaway ramp has the ramp instead of loop and friction.
     pub(super) fn joint_motion_torques(&self, controller: &Controller<N>) -> Torques<N> {
         let config = controller.config();

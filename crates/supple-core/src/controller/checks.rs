@@ -141,7 +141,7 @@ pub(super) struct SoftStop<const N: usize> {
 }
 
 impl<const N: usize> SoftStop<N> {
-    /// The soft stops of the configuration at these depths in their zones.
+    /// Returns the soft stops of the configuration at these depths in their zones.
     pub fn new(limits: &Limits<N>, depth: &Vector<N>) -> SoftStop<N> {
         SoftStop {
             depth: *depth,
@@ -150,7 +150,7 @@ impl<const N: usize> SoftStop<N> {
         }
     }
 
-    /// Torques at these joint velocities.
+    /// Returns the torques at these joint velocities.
     pub fn torque_nm(&self, velocity_rad_per_s: &Vector<N>) -> Vector<N> {
         Vector::from_fn(|joint, _| {
             let velocity = velocity_rad_per_s[joint];

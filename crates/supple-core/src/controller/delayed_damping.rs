@@ -85,7 +85,7 @@ impl<const N: usize> State<N> {
         stop
     }
 
-    /// Damping of the joints' own loops in this mode and pose \[N m s/rad\].
+    /// Returns the damping of the joints' own loops in this mode and pose \[N m s/rad\].
     fn loop_damping_nm_s_per_rad(&self, controller: &Controller<N>) -> Vector<N> {
         let config: &Config<N> = controller.config();
         if self.holds_pose() || self.activity.has_joint_loops() {

@@ -130,7 +130,7 @@ pub struct DriveGuard<const N: usize> {
 }
 
 impl<const N: usize> DriveGuard<N> {
-    /// A guard with the limits, the transmission and the period of `config`.
+    /// Returns a guard with the limits, the transmission and the period of `config`.
     pub fn new(config: &Config<N>) -> Self {
         DriveGuard {
             limits: config.limits,
@@ -164,7 +164,7 @@ impl<const N: usize> DriveGuard<N> {
         }
     }
 
-    /// Joint speeds as the guard estimates them \[rad/s\]; none before the first complete angles.
+    /// Returns the joint speeds as the guard estimates them \[rad/s\]; none before the first complete angles.
     pub fn velocity_rad_per_s(&self) -> Option<Vector<N>> {
         let estimator = self.estimator.as_ref()?;
         Some(estimator.velocity_rad_per_s)

@@ -123,12 +123,12 @@ impl<const N: usize> Encoders<N> {
         })
     }
 
-    /// The joint that turns the motor of an encoder most.
+    /// Returns the joint that turns the motor of an encoder most.
     pub(super) fn joint(&self, encoder: usize) -> usize {
         self.joint[encoder]
     }
 
-    /// The encoders of the motors that drive a joint.
+    /// Returns the encoders of the motors that drive a joint.
     pub(super) fn of(&self, joint: usize) -> impl Iterator<Item = usize> {
         let drives = self.drives[joint];
         (0..N).filter(move |encoder| drives[*encoder])

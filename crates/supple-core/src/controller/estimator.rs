@@ -27,7 +27,7 @@ pub struct EstimatorGains {
 }
 
 impl EstimatorGains {
-    /// Gains for positions measured `elapsed_s` after the last ones; `bandwidth_rad_per_s` is `omega`.
+    /// Returns the gains for positions measured `elapsed_s` after the last ones; `bandwidth_rad_per_s` is `omega`.
     pub fn new(elapsed_s: f64, bandwidth_rad_per_s: f64) -> Self {
         let r = exp(-bandwidth_rad_per_s * elapsed_s);
         EstimatorGains {
@@ -47,7 +47,7 @@ impl EstimatorGains {
         behind_rad * (self.velocity_per_s / (self.elapsed_s * innovation_share))
     }
 
-    /// Time between the measurements \[s\].
+    /// Returns the time between the measurements \[s\].
     pub fn elapsed_s(&self) -> f64 {
         self.elapsed_s
     }
@@ -63,7 +63,7 @@ pub struct Estimator<const N: usize> {
 }
 
 impl<const N: usize> Estimator<N> {
-    /// An estimator at rest at `position_rad`.
+    /// Returns an estimator at rest at `position_rad`.
     pub fn at_rest(position_rad: Vector<N>) -> Self {
         Estimator {
             position_rad,

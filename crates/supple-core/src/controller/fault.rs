@@ -198,7 +198,7 @@ pub enum SafeAction {
 }
 
 impl Fault {
-    /// Safe action for the fault. A fault in idle stays in idle: no fault energises an arm.
+    /// Returns the safe action for the fault. A fault in idle stays in idle: no fault energises an arm.
     pub fn safe_action(&self) -> SafeAction {
         match self {
             Fault::EncoderLost { .. }

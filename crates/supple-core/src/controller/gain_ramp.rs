@@ -42,7 +42,7 @@ impl<G: Interpolate> GainRamp<G> {
         GainRamp::new(gains, gains, 0.0)
     }
 
-    /// A ramp that starts now.
+    /// Returns a ramp that starts now.
     pub fn new(from: G, to: G, ramp_s: f64) -> GainRamp<G> {
         GainRamp {
             from,
@@ -57,7 +57,7 @@ impl<G: Interpolate> GainRamp<G> {
         *self = GainRamp::new(self.current(), to, ramp_s);
     }
 
-    /// The gains in force.
+    /// Returns the gains in force.
     #[inline(always)]
     pub fn current(&self) -> G {
         if self.elapsed_s >= self.ramp_s {
@@ -68,7 +68,7 @@ impl<G: Interpolate> GainRamp<G> {
 }
 
 impl GainRamp<Gains> {
-    /// Upper bound, entry by entry, of the gains in force from now on.
+    /// Returns the upper bound, entry by entry, of the gains in force from now on.
     pub fn bound(&self) -> Gains {
         let (now, to) = (self.current(), &self.to);
         Gains {
@@ -79,7 +79,7 @@ impl GainRamp<Gains> {
 }
 
 impl<const N: usize> GainRamp<JointGains<N>> {
-    /// Upper bound, entry by entry, of the gains in force from now on.
+    /// Returns the upper bound, entry by entry, of the gains in force from now on.
     pub fn bound(&self) -> JointGains<N> {
         let (now, to) = (self.current(), &self.to);
         JointGains {

@@ -101,7 +101,7 @@ impl Latch {
         self.in_contact
     }
 
-    /// Fraction of the friction feed-forward to apply, 0 to 1.
+    /// Returns the fraction of the friction feed-forward to apply, 0 to 1.
     pub fn friction_share(&self) -> f64 {
         self.share
     }
@@ -112,7 +112,7 @@ impl Latch {
         self.held
     }
 
-    /// Fraction of the viscous friction feed-forward to apply, 0 to 1; zero while the arm is blocked.
+    /// Returns the fraction of the viscous friction feed-forward to apply, 0 to 1; zero while the arm is blocked.
     pub fn viscous_share(&self, config: &ContactLatch) -> f64 {
         let fades = 1.0 - config.contact_share;
         if fades > 0.0 {
@@ -122,23 +122,23 @@ impl Latch {
         }
     }
 
-    /// Observed force against the reference's motion \[N\].
+    /// Returns the observed force against the reference's motion \[N\].
     pub fn force_against_n(&self) -> f64 {
         self.force_against_n
     }
 
-    /// Current threshold of the force against the reference's motion \[N\].
+    /// Returns the current threshold of the force against the reference's motion \[N\].
     pub fn threshold_n(&self) -> f64 {
         self.threshold_n
     }
 
-    /// Direction of motion of the reference; the last one while the reference rests, zero before it
+    /// Returns the direction of motion of the reference; the last one while the reference rests, zero before it
     /// has moved.
     pub fn direction(&self) -> Vector3<f64> {
         self.direction
     }
 
-    /// First half of a cycle: updates the direction from the reference's `velocity` \[m/s\]. A
+    /// Does the first half of a cycle: updates the direction from the reference's `velocity` \[m/s\]. A
     /// reversal of the reference opens the latch.
     #[inline]
     pub fn update_direction(&mut self, velocity: &Vector3<f64>, elapsed_s: f64) {
@@ -173,7 +173,7 @@ impl Latch {
         self.residual.add(size_n / config.threshold_n, elapsed_s);
     }
 
-    /// Second half of a cycle: compares the observed tip force with the threshold.
+    /// Does the second half of a cycle: compares the observed tip force with the threshold.
     #[inline]
     pub fn update_contact(&mut self, config: &ContactLatch, input: &LatchInput, elapsed_s: f64) {
         self.force_against_n = -input.force_n.dot(&self.direction);

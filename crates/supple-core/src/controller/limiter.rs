@@ -41,7 +41,7 @@ impl<const N: usize> MotorGroups<N> {
         }
     }
 
-    /// Motor torques equivalent to the joint torques, `m2jp^T tau` \[N m\].
+    /// Returns the motor torques equivalent to the joint torques, `m2jp^T tau` \[N m\].
     pub fn motor_torque_nm(&self, torque_nm: &Vector<N>) -> Vector<N> {
         self.motor_from_joint_torque * torque_nm
     }

@@ -34,7 +34,7 @@ macro_rules! modes {
         };
 
         impl Mode {
-            /// Short name for logs and status lines.
+            /// Returns the short name for logs and status lines.
             pub fn name(self) -> &'static str {
                 match self {
                     $(Mode::$mode => $name,)+

@@ -258,7 +258,7 @@ fn solve_pose<const N: usize>(
     }
 }
 
-/// Times at which a motion of this length is checked \[s\], from its start to its end.
+/// Returns the times at which a motion of this length is checked \[s\], from its start to its end.
 fn times_s(length_s: f64, periods: f64) -> Result<impl Iterator<Item = f64>, Refusal> {
     if periods > MAX_PERIODS || periods.is_nan() {
         return Err(Refusal::Value {

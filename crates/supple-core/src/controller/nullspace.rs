@@ -43,7 +43,7 @@ pub(super) fn nullspace_damping_nm_s_per_rad<const N: usize>(
     })
 }
 
-/// The mass matrix with held joints decoupled, as if they did not move.
+/// Returns the mass matrix with held joints decoupled, as if they did not move.
 fn active_mass_matrix<const N: usize>(config: &Config<N>, q: &Vector<N>) -> Matrix<N, N> {
     let mass_matrix = crba(&config.arm, q);
     let moves = |joint: usize| config.roles[joint] == Role::Active;

@@ -30,7 +30,7 @@ impl<const N: usize> Default for MomentumObserver<N> {
 }
 
 impl<const N: usize> MomentumObserver<N> {
-    /// Estimated external torque \[N m\].
+    /// Returns the estimated external torque \[N m\].
     pub fn external_torque_nm(&self) -> Vector<N> {
         self.residual
     }

@@ -387,12 +387,12 @@ impl<const N: usize> CycleRecord<N> {
         RequestCode::from_parts(self.request, self.trajectory, self.request_values.values())
     }
 
-    /// Mode in force; `None` if this version does not have it.
+    /// Returns the mode in force; `None` if this version does not have it.
     pub fn mode(&self) -> Option<Mode> {
         codes::mode(self.mode)
     }
 
-    /// Distance of the tip from its reference \[m\]; `None` if there is no reference.
+    /// Returns the distance of the tip from its reference \[m\]; `None` if there is no reference.
     pub fn tip_error_m(&self) -> Option<f64> {
         let error = Vector3::from(self.reference_position_m) - Vector3::from(self.tip_position_m);
         self.has_reference

@@ -37,7 +37,7 @@ pub struct GainMatrices {
 }
 
 impl GainMatrices {
-    /// Diagonal matrices.
+    /// Returns the diagonal matrices.
     pub fn diagonal(stiffness: &Vector3<f64>, damping: &Vector3<f64>) -> GainMatrices {
         GainMatrices {
             stiffness: Matrix3::from_diagonal(stiffness),
@@ -104,7 +104,7 @@ impl MatrixRamp {
         };
     }
 
-    /// The gains in force, about the base axes.
+    /// Returns the gains in force, about the base axes.
     pub fn in_base(&self, base_from_tip: &Matrix3<f64>) -> GainMatrices {
         in_base(&self.ramp.current(), self.axes, base_from_tip)
     }
@@ -124,7 +124,7 @@ impl MatrixRamp {
     }
 }
 
-/// Gain matrices about the base axes.
+/// Returns the gain matrices about the base axes.
 pub(super) fn in_base(
     gains: &GainMatrices,
     axes: GainAxes,
@@ -167,7 +167,7 @@ impl PoseGainRamps {
         }
     }
 
-    /// The gains in force, about the base axes.
+    /// Returns the gains in force, about the base axes.
     pub fn in_base(&self, base_from_tip: &Matrix3<f64>) -> PoseGains {
         let linear = self.linear.in_base(base_from_tip);
         let rotational = self.rotational.in_base(base_from_tip);

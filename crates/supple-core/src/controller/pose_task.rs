@@ -28,7 +28,7 @@ pub(super) struct PoseCycle<const N: usize> {
 }
 
 impl<const N: usize> PoseCycle<N> {
-    /// Reference of the tip's orientation.
+    /// Returns the reference of the tip's orientation.
     pub fn base_from_tip(&self) -> Matrix3<f64> {
         self.reference.base_from_tip.rotation
     }

@@ -43,7 +43,7 @@ pub(super) struct PositionLimits<const N: usize> {
 }
 
 impl<const N: usize> PositionLimits<N> {
-    /// The limits of the configuration.
+    /// Returns the limits of the configuration.
     pub fn new(limits: &Limits<N>) -> PositionLimits<N> {
         PositionLimits {
             lower_rad: limits.position_lower_rad,

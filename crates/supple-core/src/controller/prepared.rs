@@ -117,7 +117,7 @@ impl<const N: usize> Controller<N> {
         })
     }
 
-    /// Maximum delay from a motion to the resulting torque \[s\]: 3.5 cycles plus the lag of the
+    /// Returns the maximum delay from a motion to the resulting torque \[s\]: 3.5 cycles plus the lag of the
     /// velocity estimate.
     pub fn delay_s(&self) -> f64 {
         self.delay_s
@@ -147,12 +147,12 @@ impl<const N: usize> Controller<N> {
         self.has_compliance
     }
 
-    /// Time constant `t_s` with which the safe action stops a motion \[s\].
+    /// Returns the time constant `t_s` with which the safe action stops a motion \[s\].
     pub fn stop_s(&self) -> f64 {
         STOP_TIME_CONSTANT_DELAYS * self.delay_s
     }
 
-    /// Gains of the estimator after this number of periods. The common case of one period needs no exponential.
+    /// Returns the gains of the estimator after this number of periods. The common case of one period needs no exponential.
     pub(super) fn estimator_gains(&self, periods: u64) -> EstimatorGains {
         match periods {
             1 => self.one_period,
@@ -163,18 +163,18 @@ impl<const N: usize> Controller<N> {
         }
     }
 
-    /// Effect of an encoder's resolution step on the estimates.
+    /// Returns the effect of an encoder's resolution step on the estimates.
     pub(super) fn encoder_step(&self) -> &EncoderStep {
         &self.encoder_step
     }
 
-    /// Damping of each joint in the null space of the position task \[N m s/rad\]: the damping of the law, or for light joints,
-    /// such as the last ones of a wrist, the maximum that the delay allows.
+    /// Returns the damping of each joint in the null space of the position task \[N m s/rad\]: the damping of the law, or for
+    /// light joints, such as the last ones of a wrist, the maximum that the delay allows.
     pub fn nullspace_damping_nm_s_per_rad(&self) -> &Vector<N> {
         &self.nullspace_damping_nm_s_per_rad
     }
 
-    /// Maximum change of joint torque per cycle \[N m\]: from the rate limit, or with `stopping` from the
+    /// Returns the maximum change of joint torque per cycle \[N m\]: from the rate limit, or with `stopping` from the
     /// larger of the rate limit and the rate of the safe action.
     pub fn torque_step_nm(&self, stopping: bool) -> &Vector<N> {
         if stopping {
@@ -189,37 +189,37 @@ impl<const N: usize> Controller<N> {
         &self.learned_bounds
     }
 
-    /// The configuration.
+    /// Returns the configuration.
     pub fn config(&self) -> &Config<N> {
         &self.config
     }
 
-    /// `j2mp`: motor angles from joint angles.
+    /// Returns `j2mp`: motor angles from joint angles.
     pub fn motor_from_joint(&self) -> &Matrix<N, N> {
         &self.motor_from_joint
     }
 
-    /// Scalar product of force and gravity above which a force on the tip may be an unmodelled load \[N m/s^2\].
+    /// Returns the scalar product of force and gravity above which a force on the tip may be an unmodelled load \[N m/s^2\].
     pub(super) fn load_n_m_per_s2(&self) -> f64 {
         self.load_n_m_per_s2
     }
 
-    /// Limits of a motion against its torque.
+    /// Returns the limits of a motion against its torque.
     pub(super) fn against_torque_limits(&self) -> &AgainstTorqueLimits<N> {
         &self.against
     }
 
-    /// Coupling between encoders and joints.
+    /// Returns the coupling between encoders and joints.
     pub(super) fn encoders(&self) -> &Encoders<N> {
         &self.encoders
     }
 
-    /// External torque on the motor of each encoder above which dry friction does not hold it \[N m\].
+    /// Returns the external torque on the motor of each encoder above which dry friction does not hold it \[N m\].
     pub(super) fn stiction_limit_nm(&self) -> &Vector<N> {
         &self.stiction_limit_nm
     }
 
-    /// Coupling between motors and joints.
+    /// Returns the coupling between motors and joints.
     pub fn motors(&self) -> &MotorGroups<N> {
         &self.groups
     }

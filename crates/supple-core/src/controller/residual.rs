@@ -64,7 +64,7 @@ impl ResidualScale {
         self.mean_square = (self.mean_square + change).clamp(min, max);
     }
 
-    /// Factor of the configured threshold.
+    /// Returns the factor of the configured threshold.
     #[inline]
     pub fn factor(&self) -> f64 {
         if self.deviations > 0.0 {

@@ -16,7 +16,7 @@ use crate::trajectory::{Reference, Segment, Trajectory, TrajectoryError};
 pub const MAX_SET_POINT_AHEAD_S: f64 = 1.0;
 
 impl SetPoint {
-    /// Reference of the tip at the set-point.
+    /// Returns the reference of the tip at the set-point.
     pub(super) fn reference(&self) -> Reference {
         Reference {
             position: self.position_m,

@@ -92,7 +92,7 @@ pub struct State<const N: usize> {
 }
 
 impl<const N: usize> State<N> {
-    /// Idle state before the first cycle.
+    /// Returns the idle state before the first cycle.
     pub fn new(controller: &Controller<N>) -> Self {
         let config = controller.config();
         State {
@@ -136,17 +136,17 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Current mode.
+    /// Returns the current mode.
     pub fn mode(&self) -> Mode {
         self.activity.mode()
     }
 
-    /// Latched fault.
+    /// Returns the latched fault.
     pub fn fault(&self) -> Option<Fault> {
         self.fault
     }
 
-    /// Current safe action, if in a fault.
+    /// Returns the current safe action, if in a fault.
     pub fn safe_action(&self) -> Option<SafeAction> {
         match self.activity {
             Activity::Fault(action) => Some(action),
@@ -369,7 +369,7 @@ impl<const N: usize> State<N> {
         }
     }
 
-    /// Time since the activity began \[s\].
+    /// Returns the time since the activity began \[s\].
     pub(super) fn activity_s(&self, config: &Config<N>) -> f64 {
         self.activity_cycles() as f64 * config.period_s
     }

@@ -71,7 +71,7 @@ const MIN_GRAVITY_RATIO_GUIDED: f64 = 1.4;
 const ENERGY_PEAK_DECAY_S: f64 = 0.2;
 
 impl<const N: usize> State<N> {
-    /// Gravity compensation and damping of the momentum within the limits.
+    /// Returns the gravity compensation and damping of the momentum within the limits.
     pub(super) fn stopping(&self, controller: &Controller<N>) -> Torques<N> {
         let limits = &controller.config().limits;
         let gravity = self.terms.gravity;
@@ -251,7 +251,7 @@ fn is_of_motion(fault: &Fault) -> bool {
     )
 }
 
-/// Largest fraction of `more`, 0 to 1, that keeps `base` plus this fraction within `limit`.
+/// Returns the largest fraction of `more`, 0 to 1, that keeps `base` plus this fraction within `limit`.
 fn fraction_within_limit<const N: usize>(
     limit: &Vector<N>,
     base: &Vector<N>,

@@ -118,7 +118,7 @@ impl<const N: usize> Default for StuckEncoders<N> {
 }
 
 impl<const N: usize> StuckEncoders<N> {
-    /// Last measured angles of the joints \[rad\].
+    /// Returns the last measured angles of the joints \[rad\].
     pub fn measured_rad(&self) -> Vector<N> {
         self.measured_rad
     }

@@ -11,7 +11,7 @@ pub struct JointLabel<'a> {
 }
 
 impl<'a> JointLabel<'a> {
-    /// Label of the joint with this index.
+    /// Returns the label of the joint with this index.
     pub fn new(joint: usize, names: &'a [Text]) -> JointLabel<'a> {
         JointLabel { joint, names }
     }
@@ -34,7 +34,7 @@ pub trait NamesJoints {
     /// Those of the formatter.
     fn write(&self, f: &mut fmt::Formatter<'_>, names: &[Text]) -> fmt::Result;
 
-    /// The message with these joint names.
+    /// Returns the message with these joint names.
     fn with_names<'a>(&'a self, names: &'a [Text]) -> WithNames<'a, Self>
     where
         Self: Sized,

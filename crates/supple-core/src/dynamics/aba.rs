@@ -148,7 +148,7 @@ fn times(m: &Symmetric, v: V3) -> V3 {
     ]
 }
 
-/// `R M R^T`.
+/// Returns `R M R^T`.
 #[inline(always)]
 fn rotated(r: &[f64; 9], m: &Symmetric) -> Symmetric {
     let (x, y, z) = (

@@ -34,7 +34,7 @@ impl BodyMotion {
     };
 }
 
-/// Motions of all joint frames, from the base outwards.
+/// Returns the motions of all joint frames, from the base outwards.
 #[inline(always)]
 pub(super) fn body_motions<const N: usize, const G: usize>(
     arm: &Arm<N>,
@@ -72,7 +72,7 @@ pub(super) fn body_motions<const N: usize, const G: usize>(
     motions
 }
 
-/// `W`, by columns.
+/// Returns `W`, by columns.
 #[inline(always)]
 pub(super) fn acceleration_gradient<T: Number>(w: V3<T>, angular_acceleration: V3<T>) -> [T; 9] {
     let zz = w[2] * w[2];

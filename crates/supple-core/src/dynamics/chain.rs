@@ -29,7 +29,7 @@ pub(crate) struct Transform<T> {
 pub(crate) type Frame = Transform<f64>;
 
 impl<T: Number> Transform<T> {
-    /// Pose of frame `c` in `a`; `self` is frame `b` in `a`.
+    /// Returns the pose of frame `c` in `a`; `self` is frame `b` in `a`.
     #[inline(always)]
     fn then(&self, b_from_c: &Transform<T>) -> Transform<T> {
         Transform {
@@ -62,7 +62,7 @@ impl Transform<Lanes> {
     }
 }
 
-/// The lanes with the first one replaced.
+/// Returns the lanes with the first one replaced.
 #[inline(always)]
 fn first_lane(x: Lanes, first: f64) -> Lanes {
     let [_, b, c, d] = x.to_array();
@@ -111,7 +111,7 @@ impl<const G: usize> Chain<G> {
         Self::of_steps(arm, parent_rotations::<N, G>(arm, q), arm.rows.origins(), N)
     }
 
-    /// The chain in the axes of the first joint, about its origin: quantities of the joints alone
+    /// Returns the chain in the axes of the first joint, about its origin: quantities of the joints alone
     /// do not depend on this choice, and three joints need one composition less.
     #[inline(always)]
     pub fn from_first_joint<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Self {
@@ -177,7 +177,7 @@ impl<const G: usize> Chain<G> {
     }
 }
 
-/// Rotation of each joint frame in its parent's, by columns: the constant one, then the rotation
+/// Returns the rotation of each joint frame in its parent's, by columns: the constant one, then the rotation
 /// about z.
 #[inline(always)]
 pub(super) fn parent_rotations<const N: usize, const G: usize>(

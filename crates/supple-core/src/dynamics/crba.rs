@@ -92,7 +92,7 @@ fn link_by_link<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> Matrix<N, N> {
     mass_matrix
 }
 
-/// Columns of the mass matrix from the joint motions and the composite inertias; only the lower triangle is valid.
+/// Returns the columns of the mass matrix from the joint motions and the composite inertias; only the lower triangle is valid.
 #[inline(always)]
 pub(super) fn mass_columns<const N: usize, const G: usize>(
     arm: &Arm<N>,
@@ -119,7 +119,7 @@ pub(super) fn mass_columns<const N: usize, const G: usize>(
     columns
 }
 
-/// Full symmetric matrix from its lower triangle.
+/// Returns the full symmetric matrix from its lower triangle.
 #[inline(always)]
 pub(super) fn symmetric<const N: usize, const G: usize>(columns: &Columns<N, G>) -> Matrix<N, N> {
     let mut mass_matrix = Matrix::<N, N>::zeros();

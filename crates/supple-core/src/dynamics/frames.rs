@@ -12,7 +12,7 @@ use crate::math::lanes::{Rows, for_each_joint, joint_values, splat};
 use crate::math::vec3::{V3, cross, join, sub};
 use crate::model::arm::Arm;
 
-/// Velocity of a point for unit speed of each joint, linear then angular: for the tip, the columns
+/// Returns the velocity of a point for unit speed of each joint, linear then angular: for the tip, the columns
 /// of the Jacobian.
 #[inline(always)]
 pub(super) fn joint_motions<const G: usize>(chain: &Chain<G>, point: V3) -> Rows<6, G> {
@@ -23,7 +23,7 @@ pub(super) fn joint_motions<const G: usize>(chain: &Chain<G>, point: V3) -> Rows
     })
 }
 
-/// The links in base axes about a point.
+/// Returns the links in base axes about a point.
 #[inline(always)]
 pub(super) fn bodies<const N: usize, const G: usize>(
     arm: &Arm<N>,
@@ -37,7 +37,7 @@ pub(super) fn bodies<const N: usize, const G: usize>(
     )
 }
 
-/// A matrix with a column for each joint.
+/// Returns a matrix with a column for each joint.
 #[inline(always)]
 pub(super) fn matrix<const K: usize, const N: usize, const G: usize>(
     rows: &Rows<K, G>,

@@ -7,7 +7,7 @@
 use crate::math::lanes::Number;
 use crate::math::vec3::{V3, add_cross, add_scaled, cross, dot, halves, join, rotate, scale};
 
-/// A body of a joint frame `rotation` (by columns), whose origin is at `r` from the reference point.
+/// Returns a body of a joint frame `rotation` (by columns), whose origin is at `r` from the reference point.
 #[inline(always)]
 pub(super) fn in_base<T: Number>(body: [T; 10], rotation: &[T; 9], r: V3<T>) -> [T; 10] {
     let mass = body[0];
@@ -46,7 +46,7 @@ pub(super) fn in_base<T: Number>(body: [T; 10], rotation: &[T; 9], r: V3<T>) -> 
     ]
 }
 
-/// Momentum of the body for a velocity, or force on it for an acceleration.
+/// Returns the momentum of the body for a velocity, or force on it for an acceleration.
 #[inline(always)]
 pub(super) fn times<T: Number>(body: [T; 10], motion: [T; 6]) -> [T; 6] {
     let (linear, angular) = halves(motion);
@@ -58,7 +58,7 @@ pub(super) fn times<T: Number>(body: [T; 10], motion: [T; 6]) -> [T; 6] {
     )
 }
 
-/// `I w`, with `I` as `xx, xy, yy, xz, yz, zz`.
+/// Returns `I w`, with `I` as `xx, xy, yy, xz, yz, zz`.
 #[inline(always)]
 pub(super) fn inertia_times<T: Number>([xx, xy, yy, xz, yz, zz]: [T; 6], w: V3<T>) -> V3<T> {
     [
@@ -68,21 +68,21 @@ pub(super) fn inertia_times<T: Number>([xx, xy, yy, xz, yz, zz]: [T; 6], w: V3<T
     ]
 }
 
-/// Rate of change of a motion that is fixed in a body of velocity `twist`.
+/// Returns the rate of change of a motion that is fixed in a body of velocity `twist`.
 #[inline(always)]
 pub(super) fn cross_motion<T: Number>(twist: [T; 6], motion: [T; 6]) -> [T; 6] {
     let ((v, w), (linear, angular)) = (halves(twist), halves(motion));
     join(add_cross(cross(w, linear), v, angular), cross(w, angular))
 }
 
-/// Rate of change of a momentum that is fixed in a body of velocity `twist`.
+/// Returns the rate of change of a momentum that is fixed in a body of velocity `twist`.
 #[inline(always)]
 pub(super) fn cross_force<T: Number>(twist: [T; 6], force: [T; 6]) -> [T; 6] {
     let ((v, w), (linear, angular)) = (halves(twist), halves(force));
     join(cross(w, linear), add_cross(cross(w, angular), v, linear))
 }
 
-/// Torque about an axis that holds the body against gravity, `-S . (m g, h x g)`.
+/// Returns the torque about an axis that holds the body against gravity, `-S . (m g, h x g)`.
 #[inline(always)]
 pub(super) fn gravity_torque_about<T: Number>(axis: [T; 6], body: [T; 10], gravity: V3<T>) -> T {
     let (linear, angular) = halves(axis);
@@ -90,7 +90,7 @@ pub(super) fn gravity_torque_about<T: Number>(axis: [T; 6], body: [T; 10], gravi
     -(dot(linear, scale(gravity, body[0])) + dot(angular, moment))
 }
 
-/// Gradient of that torque by gravity \[kg m\]: the torque is its product with gravity.
+/// Returns the gradient of that torque by gravity \[kg m\]: the torque is its product with gravity.
 #[inline(always)]
 pub(super) fn gravity_gradient_about<T: Number>(axis: [T; 6], body: [T; 10]) -> V3<T> {
     let (linear, angular) = halves(axis);

@@ -30,7 +30,7 @@ pub(crate) struct Motion<const G: usize> {
 }
 
 impl<const G: usize> Motion<G> {
-    /// Motion for the joint velocities `qd` without joint accelerations.
+    /// Returns the motion for the joint velocities `qd` without joint accelerations.
     #[inline(always)]
     pub fn new<const N: usize>(motions: &Rows<6, G>, qd: &Vector<N>, gravity: V3) -> Self {
         let speeds = [column::<N, G>(&qd.data.0[0])];
@@ -63,13 +63,13 @@ impl<const G: usize> Motion<G> {
         self
     }
 
-    /// Velocity of the tip, `J qd`.
+    /// Returns the velocity of the tip, `J qd`.
     #[inline(always)]
     pub fn tip_rate<const N: usize>(&self) -> [f64; 6] {
         joint_values(&self.twists, N - 1)
     }
 
-    /// Classical acceleration of the tip at `qdd = 0`, `J' qd`: products of the velocities that the
+    /// Returns the classical acceleration of the tip at `qdd = 0`, `J' qd`: products of the velocities that the
     /// joints give the tip.
     #[inline(always)]
     pub fn tip_bias_acceleration<const N: usize>(&self) -> [f64; 6] {
@@ -84,7 +84,7 @@ impl<const G: usize> Motion<G> {
         )
     }
 
-    /// Force on each link, and momentum of each link.
+    /// Returns the force on each link, and momentum of each link.
     #[inline(always)]
     pub fn forces(&self, bodies: &Rows<10, G>) -> Rows<12, G> {
         for_each_joint!(
@@ -101,7 +101,7 @@ impl<const G: usize> Motion<G> {
         )
     }
 
-    /// Force on each link, by the Newton-Euler equations about the centre of mass, so that no
+    /// Returns the force on each link, by the Newton-Euler equations about the centre of mass, so that no
     /// inertia has to be transformed to the base.
     #[inline(always)]
     pub fn forces_of_links<const N: usize>(

@@ -4,7 +4,7 @@ use crate::math::lanes::{in_groups, joint_values};
 use crate::math::{Matrix3, Vector};
 use crate::model::arm::Arm;
 
-/// Rotation of joint frame `i` in its parent's joint frame, for every joint.
+/// Returns the rotation of joint frame `i` in its parent's joint frame, for every joint.
 #[cfg_attr(not(debug_assertions), inline)]
 pub(super) fn parent_rotations<const N: usize>(arm: &Arm<N>, q: &Vector<N>) -> [Matrix3<f64>; N] {
     in_groups!(N, rotations(arm, q))

@@ -47,19 +47,19 @@ impl<const G: usize> Sweep<G> {
         }
     }
 
-    /// `J' qd` of the tip.
+    /// Returns `J' qd` of the tip.
     #[inline(always)]
     pub fn tip_bias_acceleration<const N: usize>(&self) -> [f64; 6] {
         self.motion.tip_bias_acceleration::<N>()
     }
 
-    /// The mass matrix with rotor inertias; valid from the diagonal downwards.
+    /// Returns the mass matrix with rotor inertias; valid from the diagonal downwards.
     #[inline(always)]
     pub fn mass<const N: usize>(&self, arm: &Arm<N>) -> Columns<N, G> {
         mass_columns(arm, &self.motions, &suffix_sums(self.bodies))
     }
 
-    /// `G`.
+    /// Returns `G`.
     #[inline(always)]
     pub fn gravity<const N: usize>(&self, arm: &Arm<N>) -> Column<G> {
         let (carried, falls) = (suffix_sums(self.bodies), splat(arm.gravity.data.0[0]));
@@ -67,14 +67,14 @@ impl<const G: usize> Sweep<G> {
         weight
     }
 
-    /// Gradient of `G` by gravity.
+    /// Returns the gradient of `G` by gravity.
     #[inline(always)]
     pub fn gravity_gradient(&self) -> Rows<3, G> {
         let carried = suffix_sums(self.bodies);
         for_each_joint!(axis in &self.motions, body in &carried => gravity_gradient_about(axis, body))
     }
 
-    /// Joint torques, momenta and kinetic gradient of this motion.
+    /// Returns the joint torques, momenta and kinetic gradient of this motion.
     #[inline(always)]
     pub fn projection(&self) -> JointProjection<G> {
         let carried = suffix_sums(self.motion.forces(&self.bodies));
@@ -94,7 +94,7 @@ impl<const G: usize> Sweep<G> {
         }
     }
 
-    /// `H qdd + C qd + G` \[N m\].
+    /// Returns `H qdd + C qd + G` \[N m\].
     #[inline(always)]
     pub fn inverse_dynamics<const N: usize>(self, arm: &Arm<N>, qdd: &[f64; N]) -> Column<G> {
         let motion = self.motion.accelerated(&self.motions, qdd);

@@ -141,7 +141,7 @@ pub struct ChosenInertia<const D: usize> {
 }
 
 impl<const D: usize> ChosenInertia<D> {
-    /// `inertia` \[kg, kg m^2\] and the force on the tip \[N, N m\], base axes. `None` if `inertia` is not
+    /// Creates the chosen inertia from `inertia` \[kg, kg m^2\] and the force on the tip \[N, N m\], base axes. `None` if `inertia` is not
     /// positive definite.
     pub fn new(inertia: &Matrix<D, D>, force: Vector<D>) -> Option<Self> {
         Cholesky::new(inertia).map(|inertia| ChosenInertia { inertia, force })

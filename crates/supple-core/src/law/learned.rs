@@ -10,7 +10,7 @@ use crate::math::{Vector, Vector3};
 use crate::model::friction::Friction;
 use crate::model::learned::{LearnedBounds, LearnedTerms, MapWeights};
 
-/// Torque that a payload needs \[N m\].
+/// Returns the torque that a payload needs \[N m\].
 ///
 /// `force_n_per_kg` is `a - g` in base axes \[m/s^2\]; mass \[kg\] and first moment \[kg m\] in the tip frame.
 pub fn payload_torque_nm<const N: usize>(
@@ -25,7 +25,7 @@ pub fn payload_torque_nm<const N: usize>(
         + terms.jacobian.fixed_rows::<3>(3).tr_mul(&moment)
 }
 
-/// Change of the gravity torque if gravity `gravity_m_per_s2` turns by `tilt_rad`, small \[N m\].
+/// Returns the change of the gravity torque if gravity `gravity_m_per_s2` turns by `tilt_rad`, small \[N m\].
 pub fn tilt_torque_nm<const N: usize>(
     terms: &Terms<N>,
     gravity_m_per_s2: &Vector3<f64>,

@@ -73,7 +73,7 @@ fn by_mass_matrix<T: Target<D>, const D: usize, const N: usize, const G: usize>(
     Some(terms.coriolis_gravity + inertial + force + sum.torque)
 }
 
-/// Not inlined: this branch is rare for three joints, and inlining it would slow down the common one.
+/// Is not inlined: this branch is rare for three joints, and inlining it would slow down the common branch.
 #[cold]
 #[inline(never)]
 fn near_singular<T: Target<D>, const D: usize, const N: usize, const G: usize>(
@@ -86,7 +86,7 @@ fn near_singular<T: Target<D>, const D: usize, const N: usize, const G: usize>(
     by_mass_matrix(arm, roles, &sweep, input)
 }
 
-/// The first `D` of six numbers.
+/// Returns the first `D` of six numbers.
 #[inline(always)]
 fn first<const D: usize>(six: [f64; 6]) -> Vector<D> {
     Vector::from_fn(|k, _| six[k])

@@ -18,16 +18,16 @@ use crate::trajectory::Reference;
 
 /// Reference and gains of the tip in the `D` directions of a task, base axes.
 pub trait Target<const D: usize> {
-    /// `Xo'`.
+    /// Returns `Xo'`.
     fn velocity(&self) -> Vector<D>;
 
-    /// `Xo''`.
+    /// Returns `Xo''`.
     fn acceleration(&self) -> Vector<D>;
 
-    /// `K (Xo - X)`.
+    /// Returns `K (Xo - X)`.
     fn spring(&self, base_from_tip: &Pose) -> Vector<D>;
 
-    /// `B (Xo' - X')`.
+    /// Returns `B (Xo' - X')`.
     fn damper(&self, tip_velocity: &Vector<D>) -> Vector<D>;
 }
 
@@ -87,7 +87,7 @@ pub struct PoseReference {
 }
 
 impl PoseReference {
-    /// A reference at rest at `base_from_tip`.
+    /// Returns a reference at rest at `base_from_tip`.
     pub fn at_rest(base_from_tip: Pose) -> PoseReference {
         PoseReference {
             base_from_tip,
@@ -98,13 +98,13 @@ impl PoseReference {
         }
     }
 
-    /// Both velocities \[m/s, rad/s\].
+    /// Returns both velocities \[m/s, rad/s\].
     #[inline(always)]
     pub fn velocity(&self) -> Vector<6> {
         pair(&self.velocity_m_per_s, &self.angular_velocity_rad_per_s)
     }
 
-    /// Both accelerations \[m/s^2, rad/s^2\].
+    /// Returns both accelerations \[m/s^2, rad/s^2\].
     #[inline(always)]
     pub fn acceleration(&self) -> Vector<6> {
         pair(
@@ -129,7 +129,7 @@ pub struct PoseGains {
 }
 
 impl PoseGains {
-    /// Diagonal gains: those of the position, and stiffness \[N m/rad\] and damping \[N m s/rad\] about
+    /// Returns the diagonal gains: those of the position, and stiffness \[N m/rad\] and damping \[N m s/rad\] about
     /// the axes.
     pub fn diagonal(
         position: &Gains,
@@ -162,7 +162,7 @@ impl PoseGains {
 /// Tolerance for a negative minimum eigenvalue of a gain matrix due to rounding, relative to its maximum eigenvalue.
 pub(crate) const EIGENVALUE_ROUNDING: f64 = 1e-8;
 
-/// Minimum and maximum eigenvalue of a symmetric matrix; `None` if it is not symmetric or not finite.
+/// Returns the minimum and maximum eigenvalue of a symmetric matrix; `None` if it is not symmetric or not finite.
 pub(crate) fn eigenvalue_range(matrix: &Matrix3<f64>) -> Option<(f64, f64)> {
     let [min, _, max] = symmetric_eigenvalues(matrix);
     let usable = *matrix == matrix.transpose() && min.is_finite() && max.is_finite();
@@ -250,7 +250,7 @@ pub struct Posture<const N: usize> {
 }
 
 impl<const N: usize> Posture<N> {
-    /// Torque at the joint angles `position_rad` \[rad\], before its projection \[N m\].
+    /// Returns the torque at the joint angles `position_rad` \[rad\], before its projection \[N m\].
     pub fn torque_nm(&self, position_rad: &Vector<N>) -> Vector<N> {
         let error = self.position_rad - position_rad;
         let torque = self.stiffness_nm_per_rad.component_mul(&error);

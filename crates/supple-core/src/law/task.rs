@@ -31,7 +31,7 @@ pub const MAX_TASK_MASS_KG: f64 = 20.0;
 /// Greatest moment of inertia that the damped inverse commands about a lost direction \[kg m^2\].
 pub const MAX_TASK_INERTIA_KG_M2: f64 = 2.0;
 
-/// Damping of the position's inverse at the smallest singular value `sigma_m` \[1/kg\]: zero from
+/// Returns the damping of the position's inverse at the smallest singular value `sigma_m` \[1/kg\]: zero from
 /// [`SINGULAR_BELOW_M`] on, `1 / MAX_TASK_MASS_KG` at zero.
 #[inline]
 pub fn singularity_damping_per_kg(sigma_m: f64) -> f64 {
@@ -74,7 +74,7 @@ pub struct Task<const N: usize, const D: usize = 3> {
 }
 
 impl<const N: usize> Task<N, 3> {
-    /// The task of the tip's position. `None` where the mass matrix of the active joints is not
+    /// Returns the task of the tip's position. `None` where the mass matrix of the active joints is not
     /// positive definite.
     #[inline(always)]
     pub fn new(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N, 3>> {
@@ -96,7 +96,7 @@ impl<const N: usize> Task<N, 3> {
 }
 
 impl<const N: usize> Task<N, 6> {
-    /// The task of the tip's pose. `None` where the mass matrix of the active joints is not positive
+    /// Returns the task of the tip's pose. `None` where the mass matrix of the active joints is not positive
     /// definite, or where fewer than six joints are active.
     pub fn of_pose(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N, 6>> {
         Task::from_terms(terms, roles)
@@ -237,7 +237,7 @@ fn active_jacobian<const N: usize, const D: usize>(
     jacobian
 }
 
-/// The mass matrix, with the rows and columns of held joints as those of the identity.
+/// Returns the mass matrix, with the rows and columns of held joints as those of the identity.
 #[inline(always)]
 fn active_mass_matrix<const N: usize>(terms: &Terms<N>, roles: &[Role; N]) -> Matrix<N, N> {
     let mut mass_matrix = terms.mass_matrix;
@@ -251,7 +251,7 @@ fn active_mass_matrix<const N: usize>(terms: &Terms<N>, roles: &[Role; N]) -> Ma
     mass_matrix
 }
 
-/// Number of active joints.
+/// Returns the number of active joints.
 #[inline]
 pub(crate) fn count_active<const N: usize>(roles: &[Role; N]) -> usize {
     roles.iter().filter(|role| **role == Role::Active).count()
@@ -281,7 +281,7 @@ fn inverse_of_three<const N: usize, const D: usize>(
     spread(Inverse3::new(joints.map(column)).rows(), joints)
 }
 
-/// A matrix with `rows` for the joints `joints`, and zeros for all others.
+/// Returns a matrix with `rows` for the joints `joints`, and zeros for all others.
 #[inline(always)]
 fn spread<const N: usize, const D: usize>(rows: [[f64; 3]; 3], joints: [usize; 3]) -> Matrix<N, D> {
     let mut inverse = Matrix::zeros();

@@ -27,7 +27,7 @@ macro_rules! torque_terms {
                 Torques { $($term: Vector::zeros(),)* }
             }
 
-            /// Every term with its name, in the order of the fields.
+            /// Returns every term with its name, in the order of the fields.
             pub fn named(&self) -> [(&'static str, &Vector<N>); TERMS.len()] {
                 [$((stringify!($term), &self.$term),)*]
             }
@@ -80,7 +80,7 @@ torque_terms! {
 }
 
 impl<const N: usize> Torques<N> {
-    /// Sum of all terms \[N m\].
+    /// Returns the sum of all terms \[N m\].
     #[inline(always)]
     pub fn total(&self) -> Vector<N> {
         let mut sum = Vector::zeros();
@@ -90,7 +90,7 @@ impl<const N: usize> Torques<N> {
         sum
     }
 
-    /// Sum of stiffness and damping, the PD torque of the paper \[N m\].
+    /// Returns the sum of stiffness and damping, the PD torque of the paper \[N m\].
     pub fn feedback(&self) -> Vector<N> {
         self.stiffness + self.damping
     }

@@ -52,7 +52,7 @@ impl<const N: usize> Cholesky<N> {
         })
     }
 
-    /// `A^-1 B`, four columns at a time.
+    /// Returns `A^-1 B`, four columns at a time.
     #[inline(always)]
     pub fn solve<const C: usize>(&self, b: &Matrix<N, C>) -> Matrix<N, C> {
         let mut x = *b;

@@ -33,10 +33,10 @@ pub(crate) type Columns<const C: usize, const G: usize> = [Column<G>; C];
 pub(crate) trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Neg<Output = Self>
 {
-    /// The same value in all lanes.
+    /// Returns the same value in all lanes.
     fn splat(x: f64) -> Self;
 
-    /// `self * factor + summand`, see [`FUSED`].
+    /// Returns `self * factor + summand`, see [`FUSED`].
     fn multiply_add(self, factor: Self, summand: Self) -> Self;
 }
 
@@ -80,7 +80,7 @@ impl Number for Lanes {
     }
 }
 
-/// The same values for all joints of a group.
+/// Returns the same values for all joints of a group.
 #[inline(always)]
 pub(crate) fn splat<const K: usize>(x: [f64; K]) -> [Lanes; K] {
     let mut out = [Lanes::ZERO; K];
@@ -143,7 +143,7 @@ pub(crate) fn store_group<const K: usize, const G: usize>(
     }
 }
 
-/// Rows of quantities that are stored joint by joint: `of(k, joint)`.
+/// Returns the rows of quantities that are stored joint by joint: `of(k, joint)`.
 #[inline(always)]
 pub(crate) fn rows<const K: usize, const N: usize, const G: usize>(
     of: impl Fn(usize, usize) -> f64,
@@ -164,7 +164,7 @@ pub(crate) fn rows<const K: usize, const N: usize, const G: usize>(
     out
 }
 
-/// The quantities of a group.
+/// Returns the quantities of a group.
 #[inline(always)]
 pub(crate) fn load_group<const K: usize, const G: usize>(
     rows: &Rows<K, G>,
@@ -177,7 +177,7 @@ pub(crate) fn load_group<const K: usize, const G: usize>(
     out
 }
 
-/// The quantities of joint `i`.
+/// Returns the quantities of joint `i`.
 #[inline(always)]
 pub(crate) fn joint_values<const K: usize, const G: usize>(
     rows: &Rows<K, G>,
@@ -186,7 +186,7 @@ pub(crate) fn joint_values<const K: usize, const G: usize>(
     from_fn(|k| entry(&rows[k], i))
 }
 
-/// The quantities of joint `i` in all lanes.
+/// Returns the quantities of joint `i` in all lanes.
 #[inline(always)]
 pub(crate) fn broadcast_joint<const K: usize, const G: usize>(
     rows: &Rows<K, G>,
@@ -199,7 +199,7 @@ pub(crate) fn broadcast_joint<const K: usize, const G: usize>(
     out
 }
 
-/// The quantities of every joint, joint by joint.
+/// Returns the quantities of every joint, joint by joint.
 #[inline(always)]
 pub(crate) fn to_joint_arrays<const K: usize, const N: usize, const G: usize>(
     rows: &Rows<K, G>,
@@ -213,20 +213,20 @@ pub(crate) fn to_joint_arrays<const K: usize, const N: usize, const G: usize>(
     out
 }
 
-/// Entry `i` of a column.
+/// Returns entry `i` of a column.
 #[inline(always)]
 pub(crate) fn entry<const G: usize>(column: &Column<G>, i: usize) -> f64 {
     column[i / LANES].as_array()[i % LANES]
 }
 
-/// A column of `N` numbers, padded with zeros.
+/// Returns a column of `N` numbers, padded with zeros.
 #[inline(always)]
 pub(crate) fn column<const N: usize, const G: usize>(numbers: &[f64; N]) -> Column<G> {
     let [column] = rows::<1, N, G>(|_, i| numbers[i]);
     column
 }
 
-/// `s x`, entry by entry.
+/// Returns `s x`, entry by entry.
 #[inline(always)]
 pub(crate) fn scaled<const K: usize>(x: [Lanes; K], s: Lanes) -> [Lanes; K] {
     let mut out = x;
@@ -236,13 +236,13 @@ pub(crate) fn scaled<const K: usize>(x: [Lanes; K], s: Lanes) -> [Lanes; K] {
     out
 }
 
-/// One row as an array with one number per joint.
+/// Returns one row as an array with one number per joint.
 #[inline(always)]
 pub(crate) fn per_joint<const N: usize, const G: usize>(row: &[Lanes; G]) -> [f64; N] {
     from_fn(|i| entry(row, i))
 }
 
-/// Sum over the joints.
+/// Returns the sum over the joints.
 #[inline(always)]
 pub(crate) fn total<const G: usize>(row: &Column<G>) -> f64 {
     let mut sum = row[0];
@@ -276,7 +276,7 @@ pub(crate) fn prefix_sums<const K: usize, const G: usize>(
     terms
 }
 
-/// Suffix sums over the joints.
+/// Returns the suffix sums over the joints.
 #[inline(always)]
 pub(crate) fn suffix_sums<const K: usize, const G: usize>(mut terms: Rows<K, G>) -> Rows<K, G> {
     for row in &mut terms {

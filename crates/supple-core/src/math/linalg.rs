@@ -44,7 +44,7 @@ fn cubic(a: &Matrix3<f64>) -> (f64, f64, f64) {
     (mean, spread, x.clamp(-1.0, 1.0))
 }
 
-/// Smallest root of `4 y^3 - 3 y = x` for `-1 <= x <= 1`, `cos(acos(x) / 3 + 2 pi / 3)`, to 2e-16.
+/// Returns the smallest root of `4 y^3 - 3 y = x` for `-1 <= x <= 1`, `cos(acos(x) / 3 + 2 pi / 3)`, to 2e-16.
 ///
 /// The root is analytic in `sqrt(1 - x)` and interpolated at Chebyshev points of it; without
 /// rounding the error is 3e-17.
@@ -141,7 +141,7 @@ impl Inverse3 {
         squares * (bound * bound) < self.determinant * self.determinant
     }
 
-    /// The rows of the inverse.
+    /// Returns the rows of the inverse.
     #[inline(always)]
     pub fn rows(&self) -> [V3; 3] {
         let scale = 1.0 / self.determinant;
@@ -149,7 +149,7 @@ impl Inverse3 {
     }
 }
 
-/// `J J^T`: `xx, xy, yy, xz, yz, zz`.
+/// Returns `J J^T`: `xx, xy, yy, xz, yz, zz`.
 #[inline(always)]
 fn gram_3<const N: usize>(j: &[[f64; 3]; N]) -> [f64; 6] {
     let mut sums = [0.0; 6];
@@ -162,7 +162,7 @@ fn gram_3<const N: usize>(j: &[[f64; 3]; N]) -> [f64; 6] {
     sums
 }
 
-/// Smallest singular value of a 3 x `N` matrix, from its 3 x 3 Gram matrix.
+/// Returns the smallest singular value of a 3 x `N` matrix, from its 3 x 3 Gram matrix.
 ///
 /// Near zero the error is about 1e-8 times the largest singular value, and up to 3e-4 times it if
 /// two vanish together: sufficient to schedule damping, not to determine the rank.

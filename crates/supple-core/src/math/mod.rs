@@ -43,7 +43,7 @@ pub fn all_finite<const R: usize, const C: usize>(m: &Matrix<R, C>) -> bool {
     m.iter().all(|x| x.is_finite())
 }
 
-/// Smooth step from 0 at `x <= 0` to 1 at `x >= 1`, with zero first and second derivatives at both
+/// Computes the smooth step from 0 at `x <= 0` to 1 at `x >= 1`, with zero first and second derivatives at both
 /// ends (minimum jerk). Returns value, first and second derivative with respect to `x`.
 #[inline]
 pub fn smooth_step(x: f64) -> (f64, f64, f64) {

@@ -88,7 +88,7 @@ fn replace_far(angles_rad: &[Lanes], sines: &mut [Lanes], cosines: &mut [Lanes])
     }
 }
 
-/// Sine and cosine of angles no greater than [`MAX_ANGLE_RAD`].
+/// Returns the sine and cosine of angles no greater than [`MAX_ANGLE_RAD`].
 #[inline(always)]
 fn near(x: Lanes) -> (Lanes, Lanes) {
     let shifted = Number::multiply_add(x, Lanes::splat(FRAC_2_PI), Lanes::splat(ROUND));

@@ -34,7 +34,7 @@ pub(crate) fn cross<T: Number>(a: V3<T>, b: V3<T>) -> V3<T> {
     ]
 }
 
-/// `c + s v`.
+/// Returns `c + s v`.
 #[inline(always)]
 pub(crate) fn add_scaled<T: Number>(c: V3<T>, v: V3<T>, s: T) -> V3<T> {
     [
@@ -44,7 +44,7 @@ pub(crate) fn add_scaled<T: Number>(c: V3<T>, v: V3<T>, s: T) -> V3<T> {
     ]
 }
 
-/// `c + a x b`.
+/// Returns `c + a x b`.
 #[inline(always)]
 pub(crate) fn add_cross<T: Number>(c: V3<T>, a: V3<T>, b: V3<T>) -> V3<T> {
     [
@@ -54,7 +54,7 @@ pub(crate) fn add_cross<T: Number>(c: V3<T>, a: V3<T>, b: V3<T>) -> V3<T> {
     ]
 }
 
-/// `c + R v`.
+/// Returns `c + R v`.
 #[inline(always)]
 pub(crate) fn add_rotated<T: Number>(c: V3<T>, r: &[T; 9], v: V3<T>) -> V3<T> {
     add_scaled(
@@ -68,7 +68,7 @@ pub(crate) fn add_rotated<T: Number>(c: V3<T>, r: &[T; 9], v: V3<T>) -> V3<T> {
     )
 }
 
-/// `R v`.
+/// Returns `R v`.
 #[inline(always)]
 pub(crate) fn rotate<T: Number>(r: &[T; 9], v: V3<T>) -> V3<T> {
     [
@@ -78,7 +78,7 @@ pub(crate) fn rotate<T: Number>(r: &[T; 9], v: V3<T>) -> V3<T> {
     ]
 }
 
-/// `R^T v`.
+/// Returns `R^T v`.
 #[inline(always)]
 pub(crate) fn rotate_back<T: Number>(r: &[T; 9], v: V3<T>) -> V3<T> {
     [
@@ -88,7 +88,7 @@ pub(crate) fn rotate_back<T: Number>(r: &[T; 9], v: V3<T>) -> V3<T> {
     ]
 }
 
-/// `A B` of two rotations.
+/// Returns `A B` of two rotations.
 #[inline(always)]
 pub(crate) fn product<T: Number>(a: &[T; 9], b: &[T; 9]) -> [T; 9] {
     join3(
@@ -98,7 +98,7 @@ pub(crate) fn product<T: Number>(a: &[T; 9], b: &[T; 9]) -> [T; 9] {
     )
 }
 
-/// `R^T`.
+/// Returns `R^T`.
 #[inline(always)]
 pub(crate) fn transposed<T: Number>(r: &[T; 9]) -> [T; 9] {
     [r[0], r[3], r[6], r[1], r[4], r[7], r[2], r[5], r[8]]
@@ -114,13 +114,13 @@ pub(crate) fn join3<T: Number>(a: V3<T>, b: V3<T>, c: V3<T>) -> [T; 9] {
     [a[0], a[1], a[2], b[0], b[1], b[2], c[0], c[1], c[2]]
 }
 
-/// The linear and the angular part.
+/// Returns the linear and the angular part.
 #[inline(always)]
 pub(crate) fn halves<T: Number>(x: [T; 6]) -> (V3<T>, V3<T>) {
     ([x[0], x[1], x[2]], [x[3], x[4], x[5]])
 }
 
-/// Dot product of a pair of vectors with another.
+/// Returns the dot product of a pair of vectors with another.
 #[inline(always)]
 pub(crate) fn dot6<T: Number>(a: [T; 6], b: [T; 6]) -> T {
     let ((a, c), (b, d)) = (halves(a), halves(b));

@@ -28,7 +28,7 @@ impl Link {
         link_from_joint: Pose::IDENTITY.rotation,
     };
 
-    /// The body with its inertia about the centre of mass, in the joint frame.
+    /// Returns the body with its inertia about the centre of mass, in the joint frame.
     pub(crate) fn body(&self) -> Body {
         let com_m = self.first_moment / self.mass;
         Body {

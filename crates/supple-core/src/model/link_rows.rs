@@ -48,46 +48,46 @@ impl<const N: usize> LinkRows<N> {
         LinkRows { rows }
     }
 
-    /// Rotation of each joint frame in its parent's at `q = 0`, by columns. Beyond the last joint:
+    /// Returns the rotation of each joint frame in its parent's at `q = 0`, by columns. Beyond the last joint:
     /// arbitrary finite values.
     #[inline(always)]
     pub fn rotations<const G: usize>(&self) -> Rows<9, G> {
         self.groups(PARENT_FROM_JOINT)
     }
 
-    /// Origin of each joint frame in its parent's. Beyond the last joint: arbitrary finite values.
+    /// Returns the origin of each joint frame in its parent's. Beyond the last joint: arbitrary finite values.
     #[inline(always)]
     pub fn origins<const G: usize>(&self) -> Rows<3, G> {
         self.groups(PARENT_FROM_JOINT + 9)
     }
 
-    /// Rotation of each joint frame in its link frame, by columns. Beyond the last joint: arbitrary
+    /// Returns the rotation of each joint frame in its link frame, by columns. Beyond the last joint: arbitrary
     /// finite values.
     #[inline(always)]
     pub fn links_from_joints<const G: usize>(&self) -> Rows<9, G> {
         self.groups(LINK_FROM_JOINT)
     }
 
-    /// Each link's ten numbers. Beyond the last joint: zeros.
+    /// Returns each link's ten numbers. Beyond the last joint: zeros.
     #[inline(always)]
     pub fn bodies<const G: usize>(&self) -> Rows<10, G> {
         only_joints::<10, N, G>(self.groups(BODY))
     }
 
-    /// Each link's mass. Beyond the last joint: zeros.
+    /// Returns each link's mass. Beyond the last joint: zeros.
     #[inline(always)]
     pub fn masses<const G: usize>(&self) -> Rows<1, G> {
         only_joints::<1, N, G>(self.groups(BODY))
     }
 
-    /// Each link's centre of mass, then its inertia about it. Beyond the last joint: zeros.
+    /// Returns each link's centre of mass, then its inertia about it. Beyond the last joint: zeros.
     #[inline(always)]
     pub fn central<const G: usize>(&self) -> Rows<9, G> {
         only_joints::<9, N, G>(self.groups(CENTRAL))
     }
 
-    /// Inertial parameter `k` of link `i`: 0 its mass, 1 to 3 its first moment, 4 to 9 its inertia `xx, xy, yy, xz, yz, zz`
-    /// about the origin of the joint frame.
+    /// Returns the inertial parameter `k` of link `i`: 0 its mass, 1 to 3 its first moment, 4 to 9 its inertia
+    /// `xx, xy, yy, xz, yz, zz` about the origin of the joint frame.
     #[inline(always)]
     pub fn inertial_parameter(&self, k: usize, i: usize) -> f64 {
         self.rows[BODY + k][i]
@@ -121,7 +121,7 @@ fn only_joints<const K: usize, const N: usize, const G: usize>(mut rows: Rows<K,
     rows
 }
 
-/// Mask with all bits set in the lanes that have a joint.
+/// Returns the mask with all bits set in the lanes that have a joint.
 #[inline(always)]
 fn joints<const N: usize>(group: usize) -> Lanes {
     let all = f64::from_bits(u64::MAX);

@@ -20,7 +20,7 @@ impl Pose {
         translation: Vector3::new(0.0, 0.0, 0.0),
     };
 
-    /// The pose of a URDF `<origin xyz rpy>`: fixed-axis roll, pitch, yaw \[rad\], that is `Rz(yaw)
+    /// Returns the pose of a URDF `<origin xyz rpy>`: fixed-axis roll, pitch, yaw \[rad\], that is `Rz(yaw)
     /// Ry(pitch) Rx(roll)`.
     pub fn from_xyz_rpy(xyz_m: [f64; 3], rpy_rad: [f64; 3]) -> Pose {
         let ((sr, cr), (sp, cp), (sy, cy)) = (
@@ -40,7 +40,7 @@ impl Pose {
         }
     }
 
-    /// Pure translation \[m\].
+    /// Returns the pure translation \[m\].
     pub fn from_translation(translation: Vector3<f64>) -> Pose {
         Pose {
             translation,
@@ -48,7 +48,7 @@ impl Pose {
         }
     }
 
-    /// The rotation about the origin that maps z onto the unit vector `axis`; bit-exact identity if
+    /// Returns the rotation about the origin that maps z onto the unit vector `axis`; bit-exact identity if
     /// `axis` is z.
     pub fn z_onto(axis: &Vector3<f64>) -> Pose {
         if axis.x == 0.0 && axis.y == 0.0 && axis.z > 0.0 {
@@ -69,7 +69,7 @@ impl Pose {
         }
     }
 
-    /// `b_from_a` of this `a_from_b`.
+    /// Returns `b_from_a` of this `a_from_b`.
     pub fn inverse(&self) -> Pose {
         let rotation = self.rotation.transpose();
         Pose {

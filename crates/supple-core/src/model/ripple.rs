@@ -51,7 +51,7 @@ impl RippleTable {
         count: 0,
     };
 
-    /// A table of these harmonics; `None` for more than [`LINES`], a harmonic of 0, an amplitude that
+    /// Returns a table of these harmonics; `None` for more than [`LINES`], a harmonic of 0, an amplitude that
     /// is not finite, or a share beyond [`MAX_SHARE`].
     pub fn new(harmonics: &[Harmonic]) -> Option<RippleTable> {
         let valid = |h: &Harmonic| {
@@ -70,7 +70,7 @@ impl RippleTable {
         Some(table)
     }
 
-    /// The harmonics.
+    /// Returns the harmonics.
     pub fn harmonics(&self) -> &[Harmonic] {
         &self.lines[..self.count]
     }
@@ -81,7 +81,7 @@ impl RippleTable {
         self.harmonics().iter().any(scales)
     }
 
-    /// Torque that the motor adds at its angle when `motor_nm` is commanded, at the motor \[N m\].
+    /// Returns the torque that the motor adds at its angle when `motor_nm` is commanded, at the motor \[N m\].
     pub fn torque_nm(&self, motor_rad: f64, motor_nm: f64) -> f64 {
         let mut torque = 0.0;
         for line in self.harmonics() {

@@ -57,7 +57,7 @@ pub enum LimitViolation {
 }
 
 impl<const N: usize> Fourier<N> {
-    /// A series with zero amplitudes: rest at `centre_rad` for `duration_s`.
+    /// Returns a series with zero amplitudes: rest at `centre_rad` for `duration_s`.
     pub fn at_rest(centre_rad: Vector<N>, angular_frequency_rad_per_s: f64) -> Fourier<N> {
         let period_s = TAU / angular_frequency_rad_per_s;
         Fourier {
@@ -70,12 +70,12 @@ impl<const N: usize> Fourier<N> {
         }
     }
 
-    /// Period at full speed \[s\].
+    /// Returns the period at full speed \[s\].
     pub fn period_s(&self) -> f64 {
         TAU / self.angular_frequency_rad_per_s
     }
 
-    /// Reference at `time_s` since the start.
+    /// Returns the reference at `time_s` since the start.
     pub fn at(&self, time_s: f64) -> JointReference<N> {
         let left_s = self.duration_s - time_s.max(0.0);
         let (s, time_scale, time_scale_rate) = if time_s <= 0.5 * self.duration_s {
@@ -92,7 +92,7 @@ impl<const N: usize> Fourier<N> {
         }
     }
 
-    /// The series and its two derivatives at `s`.
+    /// Returns the series and its two derivatives at `s`.
     fn series(&self, s: f64) -> (Vector<N>, Vector<N>, Vector<N>) {
         let omega = self.angular_frequency_rad_per_s;
         let (sin1, cos1) = sin_cos(omega * s);

@@ -48,7 +48,7 @@ pub enum Trajectory {
 }
 
 impl Trajectory {
-    /// Reference at `time_s` since the start; before the start it is the start.
+    /// Returns the reference at `time_s` since the start; before the start it is the start.
     pub fn at(&self, time_s: f64) -> Reference {
         let time_s = time_s.max(0.0);
         match self {
@@ -61,7 +61,7 @@ impl Trajectory {
         }
     }
 
-    /// Upper bounds of speed \[m/s\] and acceleration \[m/s^2\] over the whole length, without
+    /// Returns the upper bounds of speed \[m/s\] and acceleration \[m/s^2\] over the whole length, without
     /// velocity jumps by design.
     pub fn peaks(&self) -> (f64, f64) {
         match self {
@@ -74,7 +74,7 @@ impl Trajectory {
         }
     }
 
-    /// Time after which the trajectory rests or repeats itself \[s\]; for a probe the duration of its
+    /// Returns the time after which the trajectory rests or repeats itself \[s\]; for a probe the duration of its
     /// first column.
     pub fn length_s(&self) -> f64 {
         match self {
@@ -91,7 +91,7 @@ impl Trajectory {
         }
     }
 
-    /// Number of periods within [`Trajectory::length_s`], which sets the number of samples of a check; for a
+    /// Returns the number of periods within [`Trajectory::length_s`], which sets the number of samples of a check; for a
     /// probe a quarter of its strokes, because each stroke is a straight line; 1 for a path that does not repeat.
     pub fn periods(&self) -> f64 {
         let of_length = |period_s: f64| self.length_s() / period_s;

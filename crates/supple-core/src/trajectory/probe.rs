@@ -56,7 +56,7 @@ pub struct Probe {
 }
 
 impl Probe {
-    /// Duration of the stroke down, and of the stroke up \[s\].
+    /// Returns the duration of the stroke down, and of the stroke up \[s\].
     pub fn stroke_s(&self) -> f64 {
         self.stroke_m / self.speed_m_per_s + self.ramp_s
     }
@@ -78,23 +78,23 @@ impl Probe {
         f64::from(self.strokes.saturating_sub(1))
     }
 
-    /// Time of one down, dwell, up and out \[s\].
+    /// Returns the time of one down, dwell, up and out \[s\].
     pub fn cycle_s(&self) -> f64 {
         self.retreated_s() + self.step_s(self.radial_step_m)
     }
 
-    /// Time from the start of a stroke until the tip is up again \[s\].
+    /// Returns the time from the start of a stroke until the tip is up again \[s\].
     fn retreated_s(&self) -> f64 {
         2.0 * self.stroke_s() + self.dwell_s
     }
 
-    /// Time of one column with the base advance that ends it \[s\].
+    /// Returns the time of one column with the base advance that ends it \[s\].
     pub fn column_s(&self) -> f64 {
         self.cycle_s() * f64::from(self.strokes) - self.step_s(self.radial_step_m)
             + self.advance_s()
     }
 
-    /// Phase, time into it \[s\], stroke within the column and column at `time_s`.
+    /// Returns the phase, time into it \[s\], stroke within the column and column at `time_s`.
     pub fn phase_at(&self, time_s: f64) -> (ProbePhase, f64, u32, u32) {
         let column = libm::floor(time_s.max(0.0) / self.column_s());
         let in_column = time_s.max(0.0) - column * self.column_s();
@@ -146,7 +146,7 @@ impl Probe {
         )
     }
 
-    /// Height below the top during the stroke down, zero to `-stroke_m`.
+    /// Returns the height below the top during the stroke down, zero to `-stroke_m`.
     fn stroke(&self, t: f64) -> (f64, f64, f64) {
         let v = self.speed_m_per_s;
         let stroke_s = self.stroke_s();
@@ -212,7 +212,7 @@ fn step(t: f64, duration: f64, displacement: f64) -> (f64, f64, f64) {
     )
 }
 
-/// Base coordinates of radius, azimuth and height, each with its first two derivatives.
+/// Returns the base coordinates of radius, azimuth and height, each with its first two derivatives.
 fn cylindrical(r: (f64, f64, f64), phi: (f64, f64, f64), z: (f64, f64, f64)) -> Reference {
     let (sin, cos) = sin_cos(phi.0);
     let radial = Vector3::new(cos, sin, 0.0);

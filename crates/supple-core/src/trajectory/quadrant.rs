@@ -57,7 +57,7 @@ pub struct Quadrant {
 }
 
 impl Quadrant {
-    /// `centre_m` is the corner between the edges, `first_m` and `second_m` the semi-axes
+    /// Creates a quadrant; `centre_m` is the corner between the edges, `first_m` and `second_m` the semi-axes
     /// (orthogonal vectors in base axes, they span the plane), `speed_m_per_s` the speed on every
     /// segment, `ramp_s` the ramp time of the time scaling from zero to one at the start.
     pub fn new(
@@ -83,7 +83,7 @@ impl Quadrant {
         quadrant
     }
 
-    /// The same path with a speed that rises from zero and falls to zero on every segment, each in
+    /// Returns the same path with a speed that rises from zero and falls to zero on every segment, each in
     /// `corner_ramp_s`, with minimum jerk; zero: the velocity jumps at the corners. A segment must be
     /// at least as long as its two ramps at that speed.
     pub fn with_corner_ramp(self, corner_ramp_s: f64) -> Quadrant {
@@ -104,32 +104,32 @@ impl Quadrant {
         )
     }
 
-    /// The corner between the edges \[m\].
+    /// Returns the corner between the edges \[m\].
     pub fn centre_m(&self) -> Vector3<f64> {
         self.centre_m
     }
 
-    /// First semi-axis \[m\].
+    /// Returns the first semi-axis \[m\].
     pub fn first_m(&self) -> Vector3<f64> {
         self.first_m
     }
 
-    /// Second semi-axis \[m\].
+    /// Returns the second semi-axis \[m\].
     pub fn second_m(&self) -> Vector3<f64> {
         self.second_m
     }
 
-    /// Speed on every segment \[m/s\].
+    /// Returns the speed on every segment \[m/s\].
     pub fn speed_m_per_s(&self) -> f64 {
         self.speed_m_per_s
     }
 
-    /// Ramp time of the time scaling from zero to one \[s\].
+    /// Returns the ramp time of the time scaling from zero to one \[s\].
     pub fn ramp_s(&self) -> f64 {
         self.ramp_s
     }
 
-    /// Time in which the speed rises or falls at a corner \[s\]; zero where the velocity jumps.
+    /// Returns the time in which the speed rises or falls at a corner \[s\]; zero where the velocity jumps.
     pub fn corner_ramp_s(&self) -> f64 {
         self.corner_ramp_s
     }
@@ -143,12 +143,12 @@ impl Quadrant {
         ]
     }
 
-    /// Time of one lap at full speed, with the ramps at its corners \[s\].
+    /// Returns the time of one lap at full speed, with the ramps at its corners \[s\].
     pub fn period_s(&self) -> f64 {
         self.lengths_m().iter().sum::<f64>() / self.speed_m_per_s + 3.0 * self.corner_ramp_s
     }
 
-    /// Segment, covered fraction of it (0 to 1), and completed laps at `time_s`.
+    /// Returns the segment, covered fraction of it (0 to 1), and completed laps at `time_s`.
     pub fn segment_at(&self, time_s: f64) -> (PathSegment, f64, u32) {
         let (s, _, _) = time_scaling(time_s.max(0.0), self.ramp_s);
         let at = self.locate(s);
@@ -189,7 +189,7 @@ impl Quadrant {
         }
     }
 
-    /// Distance along a segment, time scale and its rate \[1/s\], `distance_m` after the corner at full speed.
+    /// Returns the distance along a segment, time scale and its rate \[1/s\], `distance_m` after the corner at full speed.
     fn corner_scaling(&self, distance_m: f64, length_m: f64) -> (f64, f64, f64) {
         let ramp_s = self.corner_ramp_s;
         if ramp_s <= 0.0 {
@@ -235,7 +235,7 @@ impl Quadrant {
         }
     }
 
-    /// Position, unit tangent and curvature vector \[1/m\] at an arc length from the first semi-axis.
+    /// Returns the position, unit tangent and curvature vector \[1/m\] at an arc length from the first semi-axis.
     fn on_ellipse(&self, along: f64) -> (Vector3<f64>, Vector3<f64>, Vector3<f64>) {
         let k = self.arc_length_m[1..KNOTS - 1]
             .iter()
@@ -291,7 +291,7 @@ impl Quadrant {
         (speed, speed * (start + bend + corner))
     }
 
-    /// Time of the ramp and one lap \[s\].
+    /// Returns the time of the ramp and one lap \[s\].
     pub(super) fn length_s(&self) -> f64 {
         self.ramp_s + self.period_s()
     }

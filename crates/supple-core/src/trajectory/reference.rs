@@ -25,7 +25,7 @@ pub struct Reference {
 }
 
 impl Reference {
-    /// A reference at rest at `position` \[m\].
+    /// Returns a reference at rest at `position` \[m\].
     pub fn at_rest(position: Vector3<f64>) -> Reference {
         Reference {
             position,

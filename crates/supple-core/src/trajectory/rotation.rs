@@ -52,7 +52,7 @@ impl Rotation {
         }
     }
 
-    /// Peak angular speed \[rad/s\].
+    /// Returns the peak angular speed \[rad/s\].
     pub fn peak_rad_per_s(&self) -> f64 {
         MINIMUM_JERK_SPEED * abs(self.angle_rad) / self.duration_s
     }

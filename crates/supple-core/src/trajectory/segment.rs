@@ -56,7 +56,7 @@ impl Segment {
         }
     }
 
-    /// Reference at a time \[s\]; before the start it is the start.
+    /// Returns the reference at a time \[s\]; before the start it is the start.
     pub fn at(&self, time_s: f64) -> Reference {
         let since_s = (time_s - self.from_s).max(0.0);
         if since_s < self.duration_s {
@@ -66,12 +66,12 @@ impl Segment {
         self.stopping((after_s / self.stop_s).min(1.0))
     }
 
-    /// Position at which the reference comes to rest \[m\], base axes.
+    /// Returns the position at which the reference comes to rest \[m\], base axes.
     pub fn rest_m(&self) -> Vector3<f64> {
         self.stopping(1.0).position
     }
 
-    /// Time from the start of the segment until the reference rests \[s\].
+    /// Returns the time from the start of the segment until the reference rests \[s\].
     pub fn length_s(&self) -> f64 {
         self.duration_s + self.stop_s
     }
@@ -142,7 +142,7 @@ impl Segment {
     }
 }
 
-/// Value of a Bezier curve.
+/// Returns the value of a Bezier curve.
 fn de_casteljau<const K: usize>(mut points: [Vector3<f64>; K], share: f64) -> Vector3<f64> {
     for level in (1..K).rev() {
         for i in 0..level {

@@ -19,7 +19,7 @@ pub struct Sinusoid {
 }
 
 impl Sinusoid {
-    /// The paper's trajectory in the plane `y = z = 0`, at `speed` times its speed.
+    /// Returns the paper's trajectory in the plane `y = z = 0`, at `speed` times its speed.
     pub fn paper(speed: f64) -> Sinusoid {
         Sinusoid {
             centre_m: Vector3::new(0.6, 0.0, 0.0),
@@ -29,7 +29,7 @@ impl Sinusoid {
         }
     }
 
-    /// Period at full speed \[s\].
+    /// Returns the period at full speed \[s\].
     pub fn period_s(&self) -> f64 {
         core::f64::consts::TAU / self.angular_frequency_rad_per_s
     }

@@ -237,7 +237,7 @@ fn sampled(path: &Path, times_s: &[f64]) -> RecordedMotion {
 mod tests {
     use super::*;
 
-    /// Peak speed and acceleration, from differences over 40 ms.
+    /// Returns the peak speed and acceleration, from differences over 40 ms.
     fn peaks(recorded: &RecordedMotion) -> (f64, f64) {
         let (mut speed, mut acceleration) = (0.0_f64, 0.0_f64);
         let d = 8;

@@ -72,8 +72,8 @@ impl Correction {
         m
     }
 
-    /// Minimum gain of the score at which the correction is accepted. It is not zero: a small change of a column can also
-    /// compensate an error of the model.
+    /// Returns the minimum gain of the score at which the correction is accepted. It is not zero: a small change of a column can
+    /// also compensate an error of the model.
     fn threshold(&self) -> f64 {
         match self {
             Correction::Angle(_, f) if *f < 0.0 => 0.10,
@@ -185,8 +185,9 @@ impl<'a, const N: usize> CorrectionSearch<'a, N> {
         })
     }
 
-    /// Returns whether the gain has a maximum at the correction's factor: it must be greater than at half and at twice the factor. Without
-    /// this check a factor near zero would be accepted: it removes a joint from the fit, which always reduces the residual.
+    /// Returns whether the gain has a maximum at the correction's factor: it must be greater than at half and at twice the
+    /// factor. Without this check a factor near zero would be accepted: it removes a joint from the fit, which always reduces the
+    /// residual.
     fn is_a_maximum(&self, trial: &Trial) -> Result<bool, IdentError> {
         // A joint's angle and torque also affect its neighbours: a correction that reduces one residual and increases another
         // corrects no error.
@@ -216,7 +217,7 @@ impl<'a, const N: usize> CorrectionSearch<'a, N> {
         Ok(true)
     }
 
-    /// Golden-section search between the neighbours of the best start value.
+    /// Runs a golden-section search between the neighbours of the best start value.
     fn refine(
         &self,
         make: &dyn Fn(f64) -> Correction,

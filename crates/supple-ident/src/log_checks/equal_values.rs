@@ -13,7 +13,7 @@ impl Run {
     }
 }
 
-/// All runs of equal values, also those of one sample.
+/// Returns all runs of equal values, also those of one sample.
 pub(super) fn runs(values: &[f64]) -> Vec<Run> {
     let mut found = Vec::new();
     let mut first = 0;
@@ -26,7 +26,7 @@ pub(super) fn runs(values: &[f64]) -> Vec<Run> {
     found
 }
 
-/// Smallest change between successive values that is not zero: the quantum of a quantised column.
+/// Returns the smallest change between successive values that is not zero: the quantum of a quantised column.
 pub(super) fn quantum(values: &[f64]) -> f64 {
     let range = values.iter().copied().fold(f64::NEG_INFINITY, f64::max)
         - values.iter().copied().fold(f64::INFINITY, f64::min);
@@ -36,7 +36,7 @@ pub(super) fn quantum(values: &[f64]) -> f64 {
     changes.fold(f64::INFINITY, f64::min)
 }
 
-/// Median of a list that is not empty.
+/// Returns the median of a list that is not empty.
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)

@@ -30,7 +30,7 @@ pub(super) struct GravityComparison<'a, const N: usize> {
     heavy: Vec<usize>,
 }
 
-/// Sum over poses of the product of two torques at a joint.
+/// Returns the sum over poses of the product of two torques at a joint.
 fn product<const N: usize>(a: &[Vector<N>], b: &[Vector<N>], joint: usize) -> f64 {
     a.iter().zip(b).map(|(a, b)| a[joint] * b[joint]).sum()
 }
@@ -104,7 +104,7 @@ impl<'a, const N: usize> GravityComparison<'a, N> {
         ))
     }
 
-    /// Minimum correlation over the heavy joints; `change`: joint and the change of its angle \[rad\].
+    /// Returns the minimum correlation over the heavy joints; `change`: joint and the change of its angle \[rad\].
     fn min_correlation(&self, change: Option<(usize, f64)>) -> f64 {
         let given = match change {
             None => self.given.clone(),

@@ -120,7 +120,8 @@ fn many_revolutions(log: &Log, findings: &[Finding]) -> Vec<Finding> {
     found
 }
 
-/// The middle of the log, at most [`CORRECTION_SAMPLES`] samples, resampled at 20 Hz to 100 Hz but not above its own rate.
+/// Returns the middle of the log, at most [`CORRECTION_SAMPLES`] samples, resampled at 20 Hz to 100 Hz but not above its own
+/// rate.
 fn resample_middle(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
     let span_s = log.t_s[log.t_s.len() - 1] - log.t_s[0];
     let own_hz = (log.t_s.len() - 1) as f64 / span_s;
@@ -132,14 +133,14 @@ fn resample_middle(log: &Log, preparation: &Preparation) -> Result<Motion, Ident
     Ok(motion.part(first..first + kept))
 }
 
-/// The whole log resampled at 50 Hz at most.
+/// Returns the whole log resampled at 50 Hz at most.
 fn resample_whole(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
     let span_s = log.t_s[log.t_s.len() - 1] - log.t_s[0];
     let own_hz = (log.t_s.len() - 1) as f64 / span_s;
     resample(log, preparation, own_hz.min(50.0))
 }
 
-/// The whole log resampled to about 800 samples, at 20 Hz to 100 Hz.
+/// Returns the whole log resampled to about 800 samples, at 20 Hz to 100 Hz.
 pub(crate) fn resample_to_800(log: &Log, preparation: &Preparation) -> Result<Motion, IdentError> {
     let span_s = log.t_s[log.t_s.len() - 1] - log.t_s[0];
     resample(log, preparation, (800.0 / span_s).clamp(20.0, 100.0))

@@ -71,7 +71,7 @@ fn time_unit(step_s: f64) -> Option<Finding> {
     ))
 }
 
-/// Slope before sample `i` over about 50 ms, three samples or more \[rad/s\].
+/// Returns the slope before sample `i` over about 50 ms, three samples or more \[rad/s\].
 fn slope_before(log: &Log, angles: &[f64], i: usize, step_s: f64) -> Option<f64> {
     let back = ((0.05 / step_s).round() as usize).max(3);
     let from = i.checked_sub(back)?;
@@ -115,7 +115,7 @@ fn frozen_angle(log: &Log, angles: &[f64], joint: usize, step_s: f64) -> Option<
     ))
 }
 
-/// Mean length of a run, weighted with its length.
+/// Returns the mean length of a run, weighted with its length.
 fn mean_run_length(all: &[Run]) -> f64 {
     let (mut squares, mut total) = (0.0, 0.0);
     for run in all {

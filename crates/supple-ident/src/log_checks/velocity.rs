@@ -6,7 +6,7 @@ use crate::log::Log;
 /// Difference from one at which a ratio counts as wrong.
 const TOLERANCE: f64 = 0.04;
 
-/// Regression of a velocity on a slope: coefficient and correlation.
+/// Returns the regression of a velocity on a slope: coefficient and correlation.
 fn ratio(log: &Log, velocity: usize, angle: usize) -> Option<(f64, f64)> {
     let qd = log.qd_rad_per_s.as_ref()?;
     let n = log.t_s.len();

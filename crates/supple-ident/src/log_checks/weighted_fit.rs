@@ -44,7 +44,7 @@ pub(crate) struct FitResult {
 }
 
 impl FitResult {
-    /// Mean over the joints of the logarithm of the relative residual, by which corrections are compared.
+    /// Returns the mean over the joints of the logarithm of the relative residual, by which corrections are compared.
     pub fn score(&self) -> f64 {
         let sum: f64 = self
             .relative
@@ -87,7 +87,7 @@ impl GramMatrices {
         self.of_joint.iter().map(of_joint).collect()
     }
 
-    /// The matrices of the same motion with the torque of one joint multiplied by a factor.
+    /// Returns the matrices of the same motion with the torque of one joint multiplied by a factor.
     pub fn scaled(&self, row: usize, factor: f64) -> GramMatrices {
         let mut of_joint = self.of_joint.clone();
         let (gram, deviation) = &mut of_joint[row];
@@ -155,7 +155,7 @@ impl<'a, const N: usize> FitContext<'a, N> {
         })
     }
 
-    /// The same arm and columns with a narrow prior about the given arm.
+    /// Returns the same arm and columns with a narrow prior about the given arm.
     pub fn with_tight_prior(&self) -> Result<Self, IdentError> {
         Self::with_prior(
             self.arm,
@@ -247,7 +247,7 @@ impl<'a, const N: usize> FitContext<'a, N> {
         FitResult { relative, x }
     }
 
-    /// Gravity torques of the parameters `x` and of the given arm at a pose.
+    /// Returns the gravity torques of the parameters `x` and of the given arm at a pose.
     pub fn gravities(&self, x: &DVector<f64>, q: &Vector<N>) -> [Vector<N>; 2] {
         let still = Vector::zeros();
         let regressor = supple_core::dynamics::regressor(self.arm, q, &still, &still);
@@ -258,7 +258,7 @@ impl<'a, const N: usize> FitContext<'a, N> {
     }
 }
 
-/// Solution of the normal equations with some unknowns at zero.
+/// Returns the solution of the normal equations with some unknowns at zero.
 fn solve_without(
     normal: &DMatrix<f64>,
     right: &DVector<f64>,

@@ -19,8 +19,8 @@ impl fmt::Display for Derived {
     }
 }
 
-/// Rounded to two significant digits, so that a reader sees what is chosen and what is exact, and that rounding in
-/// another build changes nothing.
+/// Rounds to two significant digits, so that a reader can distinguish chosen from exact values, and that a different rounding in
+/// another build has no effect.
 pub(super) fn rounded(value: f64) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;

@@ -131,7 +131,7 @@ impl<const N: usize> Gains<N> {
     }
 }
 
-/// `m` of the module's description \[kg m^2\].
+/// Returns `m` of the module's description \[kg m^2\].
 fn min_inertia_kg_m2<const N: usize>(config: &Config<N>) -> Vector<N> {
     let inverses: Vec<Matrix<N, N>> = (0..POSES)
         .filter_map(|pose| {
@@ -155,7 +155,7 @@ fn min_inertia_kg_m2<const N: usize>(config: &Config<N>) -> Vector<N> {
     alone / most
 }
 
-/// Greatest gravity torque of each joint over its poses \[N m\].
+/// Returns the greatest gravity torque of each joint over its poses \[N m\].
 pub(super) fn max_gravity_nm<const N: usize>(config: &Config<N>) -> Vector<N> {
     let mut max = Vector::<N>::zeros();
     for pose in 0..POSES {

@@ -42,7 +42,7 @@ pub(super) fn add<const N: usize>(writer: &mut Writer, config: &Config<N>) {
     }
 }
 
-/// Greatest diagonal entries of the mass matrix over the joint ranges \[kg m^2\].
+/// Returns the greatest diagonal entries of the mass matrix over the joint ranges \[kg m^2\].
 pub(super) fn max_inertia_kg_m2<const N: usize>(config: &Config<N>) -> Vector<N> {
     let mut max = Vector::<N>::zeros();
     for pose in 0..POSES {

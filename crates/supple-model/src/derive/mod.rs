@@ -47,7 +47,7 @@ const JOINT_KEYS: [&str; 7] = [
 ];
 
 impl Description {
-    /// The arm with the settings that its TOML leaves out derived from the arm: rotor inertias (an estimate), gains,
+    /// Returns the arm with the settings that its TOML leaves out derived from the arm: rotor inertias (an estimate), gains,
     /// damping, rates, thresholds, home pose and the place of the paper's trajectories. If no `[[joints]]` are given, all but
     /// three joints are held. An arm whose TOML gives gains and home pose is returned as it is, unless it does not reach the
     /// paper's sinusoid: then the paths are placed.
@@ -116,7 +116,7 @@ fn complete<const N: usize>(given: &Description) -> Result<Completed, ModelError
     })
 }
 
-/// Root mean square, over the sinusoid, of the force at the tip that carries the gravity torques of the active joints
+/// Returns the root mean square, over the sinusoid, of the force at the tip that carries the gravity torques of the active joints
 /// \[N\]: the scale of the error that a wrong gravity model makes at a given stiffness. Zero if the sinusoid is out of
 /// reach.
 ///

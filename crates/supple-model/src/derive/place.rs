@@ -141,7 +141,7 @@ impl<const N: usize> Placed<N> {
     }
 }
 
-/// Zero if the joint is then clear of its stops, otherwise the middle of its range.
+/// Returns zero if the joint is then clear of its stops, otherwise the middle of its range.
 fn rest_rad<const N: usize>(config: &Config<N>, joint: usize) -> f64 {
     let (lower, upper) = (
         config.limits.position_lower_rad[joint],
@@ -154,7 +154,7 @@ fn rest_rad<const N: usize>(config: &Config<N>, joint: usize) -> f64 {
     }
 }
 
-/// To a millimetre or a milliradian.
+/// Rounds to a millimetre or a milliradian.
 fn rounded3(value: f64) -> f64 {
     format!("{value:.3}").parse().unwrap_or(value)
 }
@@ -170,7 +170,7 @@ fn held_but<const N: usize>(config: &Config<N>, active: &[usize; 3]) -> [Role; N
     })
 }
 
-/// The three joints with which the tip moves best.
+/// Returns the three joints with which the tip moves best.
 fn choose_three<const N: usize>(config: &Config<N>) -> [Role; N] {
     let mut best: Option<(f64, [Role; N])> = None;
     for a in 0..N {
@@ -193,7 +193,7 @@ fn choose_three<const N: usize>(config: &Config<N>) -> [Role; N] {
     best.map_or(config.roles, |(_, roles)| roles)
 }
 
-/// Evenly spread poses, held joints at their angle, no joint beyond half a turn.
+/// Returns the evenly spread poses, held joints at their angle, no joint beyond half a turn.
 fn poses<const N: usize>(config: &Config<N>, count: u32) -> impl Iterator<Item = Vector<N>> {
     let mut within = *config;
     within.limits.position_lower_rad = config.limits.position_lower_rad.map(|x| x.max(-PI));
@@ -208,7 +208,7 @@ fn poses<const N: usize>(config: &Config<N>, count: u32) -> impl Iterator<Item =
     })
 }
 
-/// Force at the tip that carries the gravity torques of the active joints \[N\].
+/// Returns the force at the tip that carries the gravity torques of the active joints \[N\].
 pub(crate) fn tip_weight_n<const N: usize>(config: &Config<N>, q: &Vector<N>) -> f64 {
     let mut state = Terms::default();
     terms(&config.arm, q, &Vector::zeros(), &mut state);
@@ -216,14 +216,14 @@ pub(crate) fn tip_weight_n<const N: usize>(config: &Config<N>, q: &Vector<N>) ->
     task.map_or(0.0, |task| task.inverse.tr_mul(&state.gravity).norm())
 }
 
-/// Greatest share of a torque limit that gravity takes.
+/// Returns the greatest share of a torque limit that gravity takes.
 fn gravity_share<const N: usize>(config: &Config<N>, q: &Vector<N>) -> f64 {
     let torque_nm = gravity(&config.arm, q);
     let share = torque_nm.component_div(&config.limits.joint_torque_nm);
     share.amax()
 }
 
-/// Home pose and paths.
+/// Returns the home pose and paths.
 fn place<const N: usize>(config: &Config<N>) -> Option<(Vector<N>, Paths)> {
     let tip = |q: &Vector<N>| tip_pose(&config.arm, q).translation;
     let all: Vec<(Vector<N>, Vector3<f64>, f64)> = poses(config, POSES)
@@ -282,7 +282,7 @@ struct Check<'a, const N: usize> {
 }
 
 impl<const N: usize> Check<'_, N> {
-    /// The four paths, at their fastest, each with the time that holds its whole geometry \[s\].
+    /// Returns the four paths, at their fastest, each with the time that holds its whole geometry \[s\].
     fn paths(&self, paths: &Paths) -> [(Trajectory, f64); 4] {
         let (sinusoid, sinusoid_s) = paths.sinusoid(FASTEST.0);
         let (quadrant, quadrant_s) = paths.quadrant(FASTEST.1);
@@ -296,8 +296,8 @@ impl<const N: usize> Check<'_, N> {
         ]
     }
 
-    /// Greatest weight of the arm at the tip on all paths \[N\], from the pose `q` at their centre; `None` if the arm does
-    /// not follow them.
+    /// Returns the greatest weight of the arm at the tip on all paths \[N\], from the pose `q` at their centre; `None` if the arm
+    /// does not follow them.
     fn weight_n(&self, paths: &Paths, q: &Vector<N>) -> Option<f64> {
         let mut weight_n: f64 = 0.0;
         for (trajectory, duration_s) in self.paths(paths) {
@@ -338,7 +338,7 @@ impl<const N: usize> Check<'_, N> {
             && (0..N).all(|i| speed[i].abs() <= SPEED_SHARE * limits.joint_speed_rad_per_s[i])
     }
 
-    /// The start pose of the sinusoid, if every path can be followed from the start pose that a run would choose.
+    /// Returns the start pose of the sinusoid, if every path can be followed from the start pose that a run would choose.
     fn start(&self, paths: &Paths) -> Option<Vector<N>> {
         let mut home = None;
         for (trajectory, duration_s) in self.paths(paths) {

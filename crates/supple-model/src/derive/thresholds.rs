@@ -48,7 +48,7 @@ pub(super) fn add_damping<const N: usize>(
     writer.set("law", "damping_n_s_per_m", list(&[damping; 3]), &why);
 }
 
-/// Greatest mass of the tip over all directions \[kg\].
+/// Returns the greatest mass of the tip over all directions \[kg\].
 fn tip_mass_kg<const N: usize>(config: &Config<N>, q: &Vector<N>) -> f64 {
     let mut state = Terms::default();
     terms(&config.arm, q, &Vector::zeros(), &mut state);

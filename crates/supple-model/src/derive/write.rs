@@ -136,7 +136,7 @@ impl Writer {
         description.with_toml(self.document.to_string())
     }
 
-    /// What was added, in order.
+    /// Returns the added settings, in order.
     pub fn finish(self) -> Vec<Derived> {
         self.derived
     }
@@ -160,7 +160,7 @@ fn put(table: &mut Table, key: &str, mut new: Value, why: &str) {
     table.insert(key, Item::Value(new));
 }
 
-/// A list of numbers.
+/// Returns a list of numbers.
 pub(super) fn list(values: &[f64]) -> Value {
     Value::Array(values.iter().copied().collect())
 }

@@ -71,7 +71,7 @@ pub struct BusMotor {
     pub without_watchdog: bool,
 }
 
-/// The bus of the TOML, if it has one.
+/// Returns the bus of the TOML, if it has one.
 pub(crate) fn bus(
     report: Reporter<'_>,
     settings: &Settings,

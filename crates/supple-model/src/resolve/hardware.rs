@@ -194,7 +194,7 @@ fn matrix(
     Ok(DMatrix::from_fn(n, n, |i, j| rows[i][j]))
 }
 
-/// The tool; its default inertia is that of a ball.
+/// Returns the tool; its default inertia is that of a ball.
 pub(crate) fn tool(report: Reporter<'_>, settings: &Settings) -> Result<Option<Tool>, ModelError> {
     let Some(tool) = &settings.tool else {
         return Ok(None);

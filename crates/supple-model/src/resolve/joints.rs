@@ -23,7 +23,7 @@ pub(crate) struct JointResolved {
     pub gains: JointSettings,
 }
 
-/// The moving joints in the chain's order.
+/// Returns the moving joints in the chain's order.
 pub(crate) fn joints(
     urdf: Reporter<'_>,
     toml: Reporter<'_>,
@@ -63,7 +63,7 @@ pub(crate) fn joints(
     resolved.collect()
 }
 
-/// The pose without torque, within the joints' limits: it may lie in a soft zone, where the arm rests on a stop.
+/// Returns the pose without torque, within the joints' limits: it may lie in a soft zone, where the arm rests on a stop.
 pub(crate) fn stow(
     toml: Reporter<'_>,
     settings: &Settings,
@@ -175,7 +175,7 @@ fn joint(
     })
 }
 
-/// Hard stops of a joint: those of the URDF, which the TOML may narrow.
+/// Returns the hard stops of a joint: those of the URDF, which the TOML may narrow.
 fn position(
     urdf: Reporter<'_>,
     toml: Reporter<'_>,

@@ -107,7 +107,7 @@ fn check_depth(report: Reporter<'_>, document: &Document<'_>) -> Result<(), Mode
     }
 }
 
-/// The next node after `node` and its descendants, in document order.
+/// Returns the next node after `node` and its descendants, in document order.
 fn next_beside<'a, 'input>(
     mut node: Node<'a, 'input>,
     depth: &mut usize,

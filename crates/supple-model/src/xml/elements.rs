@@ -47,7 +47,7 @@ pub(super) const ELEMENT_RULES: &[ElementRule] = &[
     },
 ];
 
-/// Names of the known children of an element.
+/// Returns the names of the known children of an element.
 pub(super) fn known_children(element: &str) -> &'static [&'static str] {
     let rule = ELEMENT_RULES.iter().find(|rule| rule.element == element);
     rule.map_or(&[], |rule| rule.known)
@@ -68,7 +68,7 @@ pub(super) fn children<'a, 'input>(
     node.children().filter(Node::is_element)
 }
 
-/// ``joint `elbow` <limit> (line 12)``.
+/// Returns text such as ``joint `elbow` <limit> (line 12)``.
 pub(super) fn place(node: &Node<'_, '_>) -> String {
     let owner = node
         .ancestors()

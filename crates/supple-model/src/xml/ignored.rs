@@ -143,7 +143,7 @@ impl IgnoredElements {
         entry.1 += 1;
     }
 
-    /// One finding per kind, sorted by name.
+    /// Returns one finding per kind, sorted by name.
     pub fn into_findings(self) -> Vec<Finding> {
         let findings = self.0.into_values().map(|(mut finding, count)| {
             if count > 1 {
@@ -182,14 +182,14 @@ pub(super) fn check_once(
     Ok(())
 }
 
-/// The word in `words` closest to `name`: equal, or different by one letter, or by two in words of more than five.
+/// Returns the word in `words` closest to `name`: equal, or different by one letter, or by two in words of more than five.
 fn closest_known_name<'a>(name: &str, words: &[&'a str]) -> Option<&'a str> {
     let name = name.to_ascii_lowercase();
     let near = |word: &&&str| distance(&name, word) <= if word.len() > 5 { 2 } else { 1 };
     words.iter().find(near).copied()
 }
 
-/// Levenshtein distance between two words.
+/// Returns the Levenshtein distance between two words.
 fn distance(a: &str, b: &str) -> usize {
     // Words of very different length cannot be typos of each other.
     if a.len() > b.len() + 2 {

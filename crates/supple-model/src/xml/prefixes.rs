@@ -32,7 +32,7 @@ pub(crate) fn declare_prefixes(urdf: String) -> String {
     declared
 }
 
-/// The prefix of a name at the start of a word, such as `drake` of `drake:acceleration="2.5"`.
+/// Returns the prefix of a name at the start of a word, such as `drake` of `drake:acceleration="2.5"`.
 fn prefix(word: &str) -> Option<&str> {
     let end = word.find(|c: char| !(c.is_ascii_alphanumeric() || "_-.".contains(c)))?;
     let starts_a_name = word.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_');

@@ -41,7 +41,7 @@ struct ScheduledInjection<const N: usize> {
 }
 
 impl<const N: usize> Injector<N> {
-    /// Injector without injections.
+    /// Returns the injector without injections.
     pub fn none(plant: &Plant<N>) -> Self {
         let config = plant.config();
         let joint_from_motor = config.actuators.joint_from_motor;
@@ -149,12 +149,12 @@ impl<const N: usize> Injector<N> {
         self.read_encoders(plant);
     }
 
-    /// Encoder readings of the joint angles at the end of the last cycle \[rad\].
+    /// Returns the encoder readings of the joint angles at the end of the last cycle \[rad\].
     pub fn position_rad(&self) -> &Vector<N> {
         &self.position_rad
     }
 
-    /// Encoder replies of a cycle, `None` for a lost reply. Call once per control cycle.
+    /// Returns the encoder replies of a cycle, `None` for a lost reply. Call once per control cycle.
     pub fn replies(&mut self) -> [Option<f64>; N] {
         array::from_fn(|joint| {
             let lost = self.drops_reply(joint);
@@ -208,7 +208,7 @@ impl<const N: usize> Injector<N> {
         self.scheduled.is_empty()
     }
 
-    /// Number of injections that have begun.
+    /// Returns the number of injections that have begun.
     pub fn begun(&self) -> usize {
         self.scheduled
             .iter()
@@ -275,7 +275,7 @@ impl<const N: usize> Injector<N> {
 }
 
 impl<const N: usize> ScheduledInjection<N> {
-    /// Delay line: stores a value and returns the one stored `delay` cycles ago, or the first one.
+    /// Stores a value in the delay line, and returns the one stored `delay` cycles ago, or the first one.
     fn delay_line(&mut self, value: Vector<N>) -> Vector<N> {
         self.pending.push_back(value);
         if self.pending.len() > self.delay + 1 {

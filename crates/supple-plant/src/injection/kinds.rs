@@ -114,7 +114,7 @@ pub enum InjectionKind {
 }
 
 impl InjectionKind {
-    /// Name of the kind in text form.
+    /// Returns the name of the kind in text form.
     pub fn name(&self) -> &'static str {
         match self {
             InjectionKind::EncoderStuck { .. } => "encoder-stuck",

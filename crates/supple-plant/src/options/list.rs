@@ -23,7 +23,7 @@ pub struct PlantOption {
 }
 
 impl PlantOption {
-    /// The valid values in words, as in "from 0 to 0.5 rad".
+    /// Returns the valid values in words, as in "from 0 to 0.5 rad".
     pub fn range(&self) -> String {
         let number = if self.whole { "a whole number " } else { "" };
         let unit = match self.unit {
@@ -67,12 +67,12 @@ macro_rules! plant_options {
         }),*];
 
         impl PlantOptions {
-            /// All options with their values, in the order of [`OPTIONS`].
+            /// Returns all options with their values, in the order of [`OPTIONS`].
             pub fn values(&self) -> impl Iterator<Item = (&'static PlantOption, Option<f64>)> {
                 OPTIONS.iter().zip([$(self.$name),*])
             }
 
-            /// The option of this name, to change it.
+            /// Returns the option of this name, to change it.
             pub fn value_mut(&mut self, name: &str) -> Option<&mut Option<f64>> {
                 match name {
                     $(stringify!($name) => Some(&mut self.$name),)*

@@ -130,13 +130,13 @@ impl PlantOptions {
         Self::from_toml(&text, &file)
     }
 
-    /// The set `realistic`: modest sizes of all effects together. They are assumptions, not measurements of an arm.
+    /// Returns the set `realistic`: modest sizes of all effects together. They are assumptions, not measurements of an arm.
     pub fn realistic() -> PlantOptions {
         Self::from_toml(REALISTIC, REALISTIC_NAME).expect("the built-in set is valid")
     }
 
-    /// Name of the realistic set of an arm: `openarm-realistic` for geared motors on a bus (`[bus]`), `realistic` for motors
-    /// that the TOML describes (`[motors]`), else `urdf-realistic`.
+    /// Returns the name of the realistic set of an arm: `openarm-realistic` for geared motors on a bus (`[bus]`), `realistic` for
+    /// motors that the TOML describes (`[motors]`), else `urdf-realistic`.
     pub fn realistic_name_of(arm: &Description) -> &'static str {
         match (arm.bus(), arm.describes_motors()) {
             (Some(_), _) => SETS[1],
@@ -145,21 +145,21 @@ impl PlantOptions {
         }
     }
 
-    /// The set that [`PlantOptions::realistic_name_of`] names.
+    /// Returns the set that [`PlantOptions::realistic_name_of`] names.
     pub fn realistic_of(arm: &Description) -> PlantOptions {
         let name = Self::realistic_name_of(arm);
         let read = Self::set(name).and_then(|toml| Self::from_toml(toml, name));
         read.expect("the built-in sets are valid")
     }
 
-    /// Default noise of the arm's encoders, that of [`PlantOptions::realistic_of`]: standard deviation at
+    /// Returns the default noise of the arm's encoders, that of [`PlantOptions::realistic_of`]: standard deviation at
     /// the motor \[rad\].
     pub fn default_encoder_noise_rad(arm: &Description) -> f64 {
         let noise_rad = Self::realistic_of(arm).encoder_noise_rad;
         noise_rad.expect("each built-in set has it")
     }
 
-    /// The TOML of a built-in set.
+    /// Returns the TOML of a built-in set.
     ///
     /// # Errors
     /// [`PlantOptionsError::UnknownSet`].
@@ -175,7 +175,7 @@ impl PlantOptions {
         }
     }
 
-    /// The options of a command line for `arm`: a file or a built-in set by its name, the realistic set of the arm
+    /// Returns the options of a command line for `arm`: a file or a built-in set by its name, the realistic set of the arm
     /// ([`PlantOptions::realistic_of`]), or none. A name takes precedence; write `./realistic` for a file.
     ///
     /// # Errors
@@ -203,7 +203,7 @@ impl PlantOptions {
         self.hand.is_none() && self.values().all(|(_, value)| value.is_none())
     }
 
-    /// The options in force as one line, `name = value` separated by commas; empty without any.
+    /// Returns the options in force as one line, `name = value` separated by commas; empty without any.
     pub fn line(&self) -> String {
         let set = self
             .values()
@@ -215,7 +215,7 @@ impl PlantOptions {
         set.chain(hand).collect::<Vec<_>>().join(", ")
     }
 
-    /// The options in force as a note of a log, by the name `plant`; empty without any.
+    /// Returns the options in force as a note of a log, by the name `plant`; empty without any.
     pub fn notes(&self) -> BTreeMap<String, String> {
         let line = self.line();
         let note = (!line.is_empty()).then(|| ("plant".to_owned(), line));

@@ -44,12 +44,12 @@ use supple_core::Pose;
 use supple_core::nalgebra::Vector3;
 
 impl FixedBlock {
-    /// Frame of the block, origin at the centre: `base_from_block`.
+    /// Returns the frame of the block, origin at the centre: `base_from_block`.
     pub fn pose(&self) -> Pose {
         Pose::from_xyz_rpy(self.center_m, self.rpy_rad)
     }
 
-    /// A horizontal wooden block with the centre of its top face at `top_m`.
+    /// Returns a horizontal wooden block with the centre of its top face at `top_m`.
     pub fn wooden(name: &str, top_m: Vector3<f64>, size_m: [f64; 3]) -> FixedBlock {
         FixedBlock {
             name: name.to_owned(),
@@ -63,7 +63,7 @@ impl FixedBlock {
 }
 
 impl FreeBox {
-    /// Frame of the box at the start, origin at the centre: `base_from_box`.
+    /// Returns the frame of the box at the start, origin at the centre: `base_from_box`.
     pub fn pose(&self) -> Pose {
         Pose::from_xyz_rpy(self.center_m, self.rpy_rad)
     }
@@ -83,7 +83,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// A wooden block below the whole reach of the arm, with its top face at this height \[m\].
+    /// Returns a wooden block below the whole reach of the arm, with its top face at this height \[m\].
     pub fn with_block_at(face_m: f64) -> Scene {
         let (side_m, height_m) = (2.4, 0.1);
         Scene {
@@ -99,7 +99,7 @@ impl Scene {
         }
     }
 
-    /// Material of this name: that of the scene, otherwise the built-in one.
+    /// Returns the material of this name: that of the scene, otherwise the built-in one.
     pub fn material(&self, name: &str) -> Option<Material> {
         let built_in = [Material::wood(), Material::rubber()];
         let mut all = self.materials.iter().chain(&built_in);

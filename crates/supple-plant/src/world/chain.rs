@@ -67,14 +67,14 @@ struct Links<const N: usize> {
 }
 
 impl<const N: usize> Links<N> {
-    /// Column `k` of the Jacobian of the centre of mass of link `i`, `k <= i`.
+    /// Returns column `k` of the Jacobian of the centre of mass of link `i`, `k <= i`.
     fn linear(&self, i: usize, k: usize) -> Vector3<f64> {
         self.axis[k].cross(&(self.com_m[i] - self.origin_m[k]))
     }
 }
 
 impl<const N: usize> Chain<N> {
-    /// The arm at rest at zero, with these rotor inertias at its joints.
+    /// Returns the arm at rest at zero, with these rotor inertias at its joints.
     pub fn new(arm: &Arm<N>, armature_kg_m2: Vector<N>) -> Chain<N> {
         let mut chain = Chain {
             links: links_of(arm),
@@ -109,7 +109,7 @@ impl<const N: usize> Chain<N> {
         self.update_poses();
     }
 
-    /// Diagonal of the inverse mass matrix \[1/(kg m^2)\].
+    /// Returns the diagonal of the inverse mass matrix \[1/(kg m^2)\].
     pub fn inverse_inertia(&self) -> Vector<N> {
         let mass = self.mass_matrix(&self.links_in_base());
         let inverse = mass.try_inverse();
@@ -257,7 +257,7 @@ impl<const N: usize> Chain<N> {
         solve(mass, force)
     }
 
-    /// Joint torques of the force on the tip.
+    /// Returns the joint torques of the force on the tip.
     fn tip_torque(&self, links: &Links<N>, forces: &Forces<'_, N>) -> Vector<N> {
         let TipForce {
             force_n, moment_nm, ..

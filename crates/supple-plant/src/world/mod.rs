@@ -59,7 +59,7 @@ impl<const N: usize> World<N> {
         Ok(world)
     }
 
-    /// The arm.
+    /// Returns the arm.
     pub fn arm(&self) -> &Chain<N> {
         &self.arm
     }
@@ -104,7 +104,7 @@ impl<const N: usize> World<N> {
         total
     }
 
-    /// The object with the deepest penetration of the tip, and the depth \[m\].
+    /// Returns the object with the deepest penetration of the tip, and the depth \[m\].
     pub fn deepest(&self, tip: &TipMotion) -> Option<(String, f64)> {
         let met = self.surfaces.iter().filter_map(|surface| {
             let body = &self.physics.bodies[surface.body];

@@ -60,7 +60,7 @@ impl Surface {
         }
     }
 
-    /// Contact state of the spherical tip, if it penetrates the surface.
+    /// Returns the contact state of the spherical tip, if it penetrates the surface.
     pub fn contact(&self, body: &RigidBody, ball: &Ball, tip: &TipMotion) -> Option<Contact> {
         let tip_pose = engine_math::Pose::from_translation(to_glam_vector(&tip.center_m));
         let surface_pose = *body.position() * to_glam_pose(&self.body_from_surface);

@@ -16,7 +16,7 @@ pub use values::{RequestCode, RequestCodeError, VALUES};
 use crate::controller::{Fault, Mode, Refusal, SafeAction};
 use numbers::{number_table, numbered_variants};
 
-/// A mode by its number.
+/// Returns a mode by its number.
 pub fn mode(code: u8) -> Option<Mode> {
     MODES.get(usize::from(code)).copied()
 }
@@ -43,7 +43,7 @@ impl FaultCode {
         limit: 0.0,
     };
 
-    /// Of a latched fault.
+    /// Returns the numbers of a latched fault.
     pub fn new(fault: Option<&Fault>) -> FaultCode {
         fault.map_or(FaultCode::NONE, |fault| {
             let (kind, joint, value, limit) = fault_parts(fault);
@@ -67,7 +67,7 @@ fn index(joint: usize) -> i8 {
 numbered_variants! {
     /// Numbers of [`crate::controller::Fault`].
     fault_kind;
-    /// Number, joint, value and limit of a fault.
+    /// Returns the number, joint, value and limit of a fault.
     fn fault_parts(&Fault) -> (u8, i8, f64, f64);
     /// A measurement is not finite.
     MEASUREMENT_NOT_FINITE = 1 "measurement_not_finite": Fault::MeasurementNotFinite { joint } => [joint.map_or(NO_JOINT, index), 0.0, 0.0],
@@ -124,7 +124,7 @@ numbered_variants! {
 numbered_variants! {
     /// Numbers of [`crate::controller::Refusal`].
     refusal_kind;
-    /// Number of a refusal.
+    /// Returns the number of a refusal.
     fn refusal_number(&Refusal) -> u8;
     /// Not possible in this mode.
     MODE = 1 "mode": Refusal::Mode { .. } => [],
@@ -152,7 +152,7 @@ numbered_variants! {
     LEARNING_OFF = 12 "learning_off": Refusal::LearningOff => [],
 }
 
-/// Name of a kind of fault; `None` for no fault.
+/// Returns the name of a kind of fault; `None` for no fault.
 pub fn fault_name(kind: u8) -> Option<&'static str> {
     let known = fault_kind::ALL.get(usize::from(kind));
     let name = known.map_or("unknown", |code| code.name);
@@ -160,18 +160,18 @@ pub fn fault_name(kind: u8) -> Option<&'static str> {
 }
 
 impl Fault {
-    /// Short name for logs and status lines.
+    /// Returns the short name for logs and status lines.
     pub fn name(&self) -> &'static str {
         fault_name(FaultCode::new(Some(self)).kind).unwrap_or("unknown")
     }
 }
 
-/// A safe action as a number; 0 is none.
+/// Returns the number of a safe action; 0 is none.
 pub fn safe_action(action: Option<SafeAction>) -> u8 {
     action.map_or(0, |action| action as u8)
 }
 
-/// The kind of a refusal, from 1; 0 is none.
+/// Returns the kind of a refusal, from 1; 0 is none.
 pub fn refusal(refusal: Option<&Refusal>) -> u8 {
     refusal.map_or(refusal_kind::NONE, refusal_number)
 }

@@ -104,7 +104,7 @@ macro_rules! carried_variants {
             }
         }
 
-        /// The number; what it carries is appended to `to`.
+        /// Returns the number of the variant, and appends its fields to `to`.
         fn $encode $(<const $size: usize>)? (value: &$enum $(<$size>)?, to: &mut RequestCode) -> u8 {
             match value {
                 $($enum::$variant $({ $($field),+ })? $(($item))? => {
@@ -115,7 +115,7 @@ macro_rules! carried_variants {
             }
         }
 
-        /// What has the number, with what it carries taken from `from`.
+        /// Returns the variant with this number, and takes its fields from `from`.
         fn $decode $(<const $size: usize>)? (
             number: u8,
             from: &mut CodeReader<'_>,

@@ -132,7 +132,7 @@ impl fmt::Display for RequestCodeError {
 impl core::error::Error for RequestCodeError {}
 
 impl RequestCode {
-    /// Of a request.
+    /// Returns the code of a request.
     pub fn new<const N: usize>(request: Option<&Request<N>>) -> RequestCode {
         let mut code = RequestCode::NONE;
         if let Some(request) = request {
@@ -141,7 +141,7 @@ impl RequestCode {
         code
     }
 
-    /// The request of these numbers.
+    /// Returns the request of these numbers.
     ///
     /// # Errors
     /// [`RequestCodeError`].

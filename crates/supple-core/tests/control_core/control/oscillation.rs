@@ -52,7 +52,8 @@ fn torques_that_come_late_are_a_fault_before_the_arm_is_fast() {
     assert!(late(0).is_none());
 }
 
-/// Returns whether an oscillation of joint 3 with this frequency and first peak, which grows by this factor in each swing, is a fault.
+/// Returns whether an oscillation of joint 3 with this frequency and first peak, which grows by this factor in each swing, is a
+/// fault.
 fn is_fault(frequency_hz: f64, peak_rad_per_s: f64, growth: f64) -> bool {
     let mut rig = Rig::holding(four(), bent());
     let start_s = 20e-3;

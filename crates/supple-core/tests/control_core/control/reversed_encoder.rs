@@ -141,8 +141,8 @@ fn a_reversed_encoder_while_tracking_is_detected_soon() {
     }
 }
 
-/// Returns whether the test for sudden reversals has detected the fault: its limit is six times that of the other test, 4 N m for this
-/// arm.
+/// Returns whether the test for sudden reversals has detected the fault: its limit is six times that of the other test, 4 N m for
+/// this arm.
 fn is_sudden_reversal(found: Option<(Fault, u64)>) -> bool {
     matches!(found, Some((Fault::MotionAgainstTorque { limit_nm, .. }, _)) if limit_nm > 5.0)
 }
