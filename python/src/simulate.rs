@@ -113,7 +113,7 @@ fn sized<const N: usize>(
             return Err(ExperimentError::Interrupted);
         }
         if let Some(recorder) = &mut recorder {
-            recorder.cycle(cycle)?;
+            recorder.write_cycle(cycle)?;
         }
         if let Some(time_s) = time_s {
             row(&mut cycles, time_s, cycle);
