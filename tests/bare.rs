@@ -1,5 +1,5 @@
-//! The freestanding program: it links without std, allocator and C library, computes the same results as a hosted
-//! build, bit for bit, and fails to link if anything allocates.
+//! Tests of the freestanding program: it links without std, allocator and C library, computes bit-identical results to a hosted
+//! build, and fails to link if any code allocates memory.
 
 use std::env;
 use std::path::PathBuf;
@@ -96,14 +96,17 @@ fn needs_no_loader_and_no_shared_library() {
 )]
 fn one_allocation_makes_the_build_fail() {
     let built = build("freestanding,negative-control", &[]);
-    assert!(!built.status.success(), "an allocation went unnoticed");
+    assert!(
+        !built.status.success(),
+        "the build succeeded in spite of an allocation"
+    );
     let stderr = text(&built.stderr);
     let errors: Vec<&str> = stderr.lines().filter(|l| l.starts_with("error")).collect();
     assert!(
         matches!(errors[..], [first, last]
             if first.contains("no global memory allocator found")
                 && last.contains("could not compile `supple-bare` (bin")),
-        "it failed for another reason:\n{stderr}"
+        "the build failed for another reason:\n{stderr}"
     );
 }
 

@@ -1,4 +1,4 @@
-//! Required results of the paper's experiments, for any seed.
+//! Tests of the required results of the paper's experiments, for any seed.
 
 use supple_core::Trajectory;
 use supple_core::controller::Mode;
@@ -127,7 +127,7 @@ fn the_law_as_printed_diverges_and_ends_in_a_fault() {
         stribeck: false,
         ..perturbed(0)
     });
-    let ended = run.ended.expect("a fault ends it");
+    let ended = run.ended.expect("a fault ends the run");
     assert!(ended.ended_s > 0.5, "{ended:?}");
     assert!(run.max_error_m <= 0.26, "{} m", run.max_error_m);
 }
@@ -159,10 +159,10 @@ fn the_impulse_depends_on_stiffness_and_the_first_transient_does_not() {
     assert!(fit.slope > 0.0 && fit.r2 >= 0.97, "{fit:?}");
 }
 
-/// At low stiffness the impulse is the impact and what friction adds. The impact by itself is that of the mass
-/// which the arm's own dynamics give the tip, whatever the stiffness.
+/// At low stiffness, the impulse consists of the impact and the effect of friction. The impact depends on the apparent mass of
+/// the arm at the tip, and not on the stiffness.
 #[test]
-fn a_soft_contact_is_the_impact_and_little_else() {
+fn the_impulse_of_a_soft_contact_is_mostly_that_of_the_impact() {
     let stiffness = [0.5, 1.0, 2.0, 125.0];
     let strokes = side_by_side(&stiffness, |k| probing(&perturbed(0), *k));
     let setup = wam4();
@@ -177,7 +177,7 @@ fn a_soft_contact_is_the_impact_and_little_else() {
     for stroke in &strokes {
         let speed = stroke.approach_m_per_s * (1.0 + stroke.restitution);
         let ratio = stroke.impact_newton_s / (mass_kg * speed);
-        // 1.11 to 1.17: the friction of the joints acts in the milliseconds of an impact too.
+        // The ratio is 1.11 to 1.17, because joint friction also acts during the impact.
         assert!((0.9..=1.2).contains(&ratio), "{ratio} {stroke:?}");
     }
     for stroke in &strokes[..3] {
@@ -186,10 +186,10 @@ fn a_soft_contact_is_the_impact_and_little_else() {
     }
 }
 
-/// With the error of an identification the arm presses as the spring asks at 125 N/m. At 5 N/m the spring's 0.2 N
-/// are a tenth of what friction can hide at rest: the arm may press less, never more.
+/// With the model error of an identification, the arm presses with the force of the spring at 125 N/m. At 5 N/m, the 0.2 N of the
+/// spring are a tenth of the friction at rest: the arm may press less, but not more.
 #[test]
-fn the_force_while_pressing_is_the_springs() {
+fn the_pressing_force_is_that_of_the_spring() {
     let cases: Vec<(u64, f64)> = (0..5)
         .flat_map(|seed| [(seed, 5.0), (seed, 125.0)])
         .collect();
@@ -220,7 +220,7 @@ fn without_fading_the_friction_feed_forward_becomes_contact_force() {
         "{left_on:?} {faded:?}"
     );
     assert!(left_on.impulse_newton_s > 1.5 * faded.impulse_newton_s);
-    let latched_s = faded.latched_after_s.expect("contact is noticed");
+    let latched_s = faded.latched_after_s.expect("contact is detected");
     assert!(latched_s < 0.02, "{latched_s} s");
 }
 
@@ -332,7 +332,7 @@ fn perturbed_models_track_a_pose_at_5_n_per_m_and_half_a_n_m_per_rad() {
     }
 }
 
-/// Seven active joints have four directions in which the position task leaves them free, down to the wrist.
+/// With seven active joints, the position task leaves four directions free, including the wrist.
 #[test]
 fn the_sinusoid_runs_with_seven_active_joints() {
     let description = Description::asset("wam7")
@@ -356,9 +356,9 @@ fn the_sinusoid_runs_with_seven_active_joints() {
     assert!(run.rms_error_m < 0.015, "{} m", run.rms_error_m);
 }
 
-/// Sinusoids in the workspace of the arms with geared motors, at 5 N/m with a model that has the error of an identification.
-/// In the sagittal plane of the OpenArm joint 2 rests, as the base of the paper's arm does. Beside that plane it moves little
-/// and reverses, at a short lever: its dry friction then holds the tip some 20 mm off.
+/// Tracks sinusoids with the arms with geared motors, at 5 N/m with a model that has the error of an identification. In the
+/// sagittal plane of the OpenArm, joint 2 stands still, as the base of the paper's arm does. Outside this plane, it moves slightly
+/// and reverses, with a short lever arm: its dry friction then causes a tip error of some 20 mm.
 #[test]
 fn openarm_and_yam_track_a_sinusoid_at_5_n_per_m() {
     fn rms_error_m<const N: usize>(name: &str, centre_m: [f64; 3], seed: u64) -> f64 {

@@ -1,4 +1,4 @@
-//! Compares the paper's experiments through all processes in virtual time (controller, shared memory, bus,
+//! Tests that compare the paper's experiments through all processes in virtual time (controller, shared memory, bus,
 //! pucks, arm) with the same experiments in one process (controller and plant).
 //!
 //! Differences between the two, which explain the tolerances: on the bus encoders are read and torques applied
@@ -30,12 +30,12 @@ const MAX_RMS_DIFFERENCE_M: f64 = 3e-4;
 /// the stroke: on the bus the arm comes from a move, in one process it starts at rest.
 const TRANSIENT_FRACTION: f64 = 0.2;
 /// Maximum difference between the forces at rest \[N\]. The same controller leaves the same residual dry
-/// friction; one that knew the plant's breakaway would rest with 0.3 N more.
+/// friction; a controller with the plant's breakaway torque would have 0.3 N more at rest.
 const MAX_REST_DIFFERENCE_N: f64 = 0.05;
 /// Window of the first transient \[ms\].
 const TRANSIENT_MS: usize = 50;
 
-/// Summary of a run on the emulated arm, and the vertical forces of its trace, one per millisecond.
+/// Runs the emulated arm; returns the summary and the vertical forces of the trace, one per millisecond.
 fn on_the_bus(arguments: &[&str]) -> (Value, Vec<f64>) {
     let folder = tempfile::tempdir().expect("a folder");
     let owner = std::fs::Permissions::from_mode(0o700);
@@ -62,7 +62,7 @@ fn on_the_bus(arguments: &[&str]) -> (Value, Vec<f64>) {
     (summary, forces.collect())
 }
 
-/// RMS error and vertical forces, one per cycle, of the same run in one process.
+/// Runs the same experiment in one process; returns RMS error and vertical forces, one per cycle.
 fn in_one_process(trajectory: Trajectory, duration_s: f64, scene: Scene) -> (f64, Vec<f64>) {
     let description = Description::asset("wam4").expect("built in");
     let setup = Setup::<4>::new(&description, 0).expect("valid");
@@ -117,7 +117,7 @@ fn the_quadrant_tracking_error_matches_one_process() {
     assert_same_tracking_error("quadrant", Trajectory::Quadrant(quadrant));
 }
 
-/// Maximum force of the first transient, and mean force at rest before the stroke reverses \[N\].
+/// Returns the maximum force of the first transient, and the mean force at rest before the stroke reverses \[N\].
 fn contact(forces: &[f64], probe: &Probe) -> (f64, f64) {
     let touch = forces.iter().position(|force| *force > 0.0);
     let touch = touch.expect("contact with the block");

@@ -1,5 +1,5 @@
-//! Closed-loop identification of the simulated arm: the result is compared with the plant and used to track at
-//! 5 N/m. The fit uses only what the arm logs.
+//! Tests of the closed-loop identification of the simulated arm: the result is compared with the plant and used to track at
+//! 5 N/m. The fit uses only data that the arm logs.
 
 use nalgebra::DMatrix;
 use std::path::Path;
@@ -34,7 +34,7 @@ fn sinusoid(found: &CalibrationResult<4>, calibration: &Calibration) -> Identifi
     let plant = plant_of::<4>(&wam4(), calibration).expect("four joints");
     track_with_identified_model(&found.description, &plant)
         .expect("the sinusoid runs")
-        .expect("the arm reaches it")
+        .expect("the arm reaches the sinusoid")
 }
 
 fn side_by_side<O: Send>(seeds: u64, f: impl Fn(u64) -> O + Sync) -> Vec<O> {
@@ -46,7 +46,7 @@ fn side_by_side<O: Send>(seeds: u64, f: impl Fn(u64) -> O + Sync) -> Vec<O> {
     })
 }
 
-/// A calibration whose plant has exactly the friction that the model can express, so that the model is comparable.
+/// Returns a calibration whose plant has only friction that the model can represent, so that plant and model are comparable.
 fn without_load(seed: u64) -> Calibration {
     Calibration {
         load: false,
@@ -73,7 +73,7 @@ fn the_identified_model_is_accurate_enough_for_5_n_per_m() {
         )
     });
     for (truth, breakaway, positive_definite, errors) in results {
-        // Neither the reversal of the bristles nor the law's band hides the Stribeck effect.
+        // Neither the presliding of the bristle model nor the friction band of the law hides the Stribeck effect.
         assert!(
             breakaway.iter().all(|ratio| (ratio - 1.0).abs() < 0.02),
             "{breakaway:?}"
@@ -91,7 +91,7 @@ fn the_identified_model_is_accurate_enough_for_5_n_per_m() {
     }
 }
 
-/// Ripple of 0.3 N m at each joint, identified from runs at constant speed.
+/// Identifies a ripple of 0.3 N m at each joint from runs at constant speed.
 #[test]
 fn ripple_is_identified_and_compensated() {
     let errors = side_by_side(SEEDS, |seed| {
@@ -107,7 +107,7 @@ fn ripple_is_identified_and_compensated() {
                 .all(|table| !table.harmonics().is_empty())
         );
         let with = sinusoid(&found, &calibration);
-        // The cost without compensation is measured for a few seeds only.
+        // The error without compensation is measured for a few seeds only.
         let without = (seed < 2).then(|| {
             let mut without = found.clone();
             let model = without
@@ -171,7 +171,7 @@ fn measured_breakaway_torque_matches_the_plant() {
     }
 }
 
-/// With 0.3 N m of ripple at each joint; the table is identified from slow motion before any model.
+/// Each joint has 0.3 N m of ripple; the ripple table is identified from slow motion before the model.
 #[test]
 fn ripple_compensation_improves_the_breakaway_measurement() {
     let calibration = Calibration {
@@ -224,8 +224,8 @@ fn predicted_tracking_error_bounds_the_measured_one() {
     );
 }
 
-/// Fast moves through the workspace, each followed by a rest, do not reach the collision thresholds that the calibration
-/// has set from the model's residual, and these are tighter than the default.
+/// Fast moves through the workspace, each followed by a rest, do not reach the collision thresholds that the calibration derives
+/// from the model's residual; these thresholds are tighter than the default.
 #[test]
 fn identified_collision_thresholds_are_tight_and_not_reached_by_moves() {
     let calibration = without_load(3);
@@ -263,7 +263,7 @@ fn identified_collision_thresholds_are_tight_and_not_reached_by_moves() {
         steps,
     };
     let mut share = Vector::<4>::zeros();
-    // A fault is an error.
+    // The run returns a fault as an error.
     let done = sequence.perform(&mut |cycle, step| {
         if step > 0 {
             let external_nm = cycle.output.external_torque_nm.abs();
@@ -278,7 +278,7 @@ fn identified_collision_thresholds_are_tight_and_not_reached_by_moves() {
     assert!(share.max() < 0.8, "{share}");
 }
 
-/// Friction is 10 % too small in every joint and is learnt from each period's prediction error only.
+/// Friction is 10 % too small in every joint and is learnt only from each period's prediction error.
 #[test]
 fn a_friction_error_of_10_percent_is_learnt_within_four_periods() {
     let description = wam4();
@@ -326,14 +326,17 @@ fn a_friction_error_of_10_percent_is_learnt_within_four_periods() {
             .friction;
     }
     println!("{errors:?}");
-    assert!(errors[0] > 6e-3, "there is something to learn: {errors:?}");
+    assert!(
+        errors[0] > 6e-3,
+        "the initial error is too small to test learning: {errors:?}"
+    );
     assert!(errors[3] <= 6e-3, "{errors:?}");
 }
 
-/// An operator who confirms everything.
-struct Willing;
+/// Operator that confirms every question.
+struct ConfirmingOperator;
 
-impl Operator for Willing {
+impl Operator for ConfirmingOperator {
     fn progress(&mut self, _: &str) {}
 
     fn confirms(&mut self, _: &Sweep, _: &Path) -> bool {
@@ -341,7 +344,7 @@ impl Operator for Willing {
     }
 }
 
-/// Starts the steps of a calibration on a simulated arm that is connected wrongly; returns the refusal.
+/// Starts a calibration of a simulated arm with wrong wiring; returns the error.
 fn refusal(wiring: Wiring<4>) -> String {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::create_dir_all(folder.path().join(LOGS)).expect("created");
@@ -352,13 +355,13 @@ fn refusal(wiring: Wiring<4>) -> String {
     let mut simulated =
         InProcessArm::new(plant, home, logs, Default::default()).with_wiring(wiring);
     let options = ProcedureOptions::new(folder.path().to_owned());
-    let result = calibrate_arm(&mut simulated, &arm, &options, &mut Willing);
-    result.expect_err("it is refused").to_string()
+    let result = calibrate_arm(&mut simulated, &arm, &options, &mut ConfirmingOperator);
+    result.expect_err("the calibration is refused").to_string()
 }
 
-/// A joint whose motor moves another's encoder is named, and a motor that turns the other way.
+/// The error names a joint whose motor moves the encoder of another joint, and a motor with reversed direction.
 #[test]
-fn wrong_wiring_is_named() {
+fn the_error_of_wrong_wiring_names_the_joint() {
     let swapped = refusal(Wiring {
         encoder_of: Some([2, 1, 0, 3]),
         ..Wiring::AS_DESCRIBED
@@ -375,8 +378,8 @@ fn wrong_wiring_is_named() {
     }
 }
 
-/// From a model 15 % off in gravity and 50 % in friction, on a realistic arm: within six minutes of motion, stated
-/// beforehand, the model explains what it has not seen, and with learning the sinusoid is followed at 5 N/m.
+/// Calibrates a realistic arm from a model with errors of 15 % in gravity and 50 % in friction: within six minutes of motion, as
+/// predicted, the model predicts held-out data, and with learning the arm tracks the sinusoid at 5 N/m.
 #[test]
 fn a_realistic_arm_is_calibrated_step_by_step() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -404,7 +407,8 @@ fn a_realistic_arm_is_calibrated_step_by_step() {
     let logs = folder.path().join(LOGS);
     let mut simulated = InProcessArm::new(plant, home, logs, Default::default());
     let options = ProcedureOptions::new(folder.path().to_owned());
-    let found = calibrate_arm(&mut simulated, &start, &options, &mut Willing).expect("calibrated");
+    let found = calibrate_arm(&mut simulated, &start, &options, &mut ConfirmingOperator)
+        .expect("calibrated");
     let progress = found.progress;
     assert!(
         progress.moved_s <= 360.0,
@@ -418,11 +422,11 @@ fn a_realistic_arm_is_calibrated_step_by_step() {
     let sinusoid = progress.sinusoid.expect("in reach");
     assert_eq!(sinusoid.ended, None);
     let [alone_m, learning_m] = [sinusoid.calibrated_rms_m, sinusoid.learning_rms_m];
-    // Without the springs, the tilt and the compliance that the fit finds, the model alone is 118 mm off.
+    // Without the springs, the tilt and the compliance that the fit finds, the error of the model alone is 118 mm.
     assert!(alone_m.is_some_and(|m| m < 0.025), "{sinusoid:?}");
     assert!(learning_m.is_some_and(|m| m < 0.005), "{sinusoid:?}");
     assert_eq!(sinusoid.false_contacts, 0);
-    // What was learned is kept: with it the arm, as warm as it is now, needs no more learning.
+    // With the learned terms, the warm arm needs no further learning.
     let kept = sinusoid.learned_model.expect("learned");
     let kept = Description::load(folder.path().join(kept).join("arm.toml")).expect("saved");
     let warm = Calibration {

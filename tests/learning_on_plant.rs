@@ -1,4 +1,4 @@
-//! Learning while moving, on the plant, whose friction, engine, encoders and delays are not those of the model.
+//! Tests of learning during motion on the plant, whose friction, physics engine, encoders and delays differ from the model.
 
 use supple_core::Trajectory;
 use supple_core::controller::Request;
@@ -33,7 +33,7 @@ fn plan(deviation: Deviation, (trajectory, duration_s): (Trajectory, f64)) -> Pl
     }
 }
 
-/// RMS error of the tip after [`LEARNED_S`] \[m\], and what was asked to come into force until the end.
+/// Returns the RMS error of the tip after [`LEARNED_S`] \[m\], and the learned terms at the end.
 fn track(plan: &Plan<4>) -> (f64, LearnedTerms<4>) {
     let (mut late, mut terms) = (Rms::default(), plan.config.learned);
     let run = run(plan, &mut |cycle, time_s| {
@@ -59,7 +59,7 @@ fn sinusoid() -> (Trajectory, f64) {
     (scenario::sinusoid(1.0).0, LEARNED_S + 16.0)
 }
 
-/// Each of them alone leaves 50 to 97 mm without learning.
+/// Each deviation alone causes an error of 50 to 97 mm without learning.
 #[test]
 fn deviations_are_within_6_mm_after_24_s() {
     for deviation in [
@@ -77,10 +77,10 @@ fn deviations_are_within_6_mm_after_24_s() {
 
 /// A model without deviation tracks at least as well as before: 3.2 mm without learning.
 #[test]
-fn learning_does_no_harm_to_a_good_model() {
+fn learning_does_not_degrade_an_exact_model() {
     let (rms_m, terms) = track(&plan(Deviation::None, sinusoid()));
     assert!(rms_m <= 3.5e-3, "{:.2} mm", 1e3 * rms_m);
-    // Also on another path, with what the sinusoid taught.
+    // The result also holds on another path, with the terms learned on the sinusoid.
     let mut arc = plan(Deviation::None, (scenario::arc().0, LEARNED_S + 16.0));
     arc.learning = false;
     let (without_m, _) = track(&arc);
@@ -94,12 +94,12 @@ fn learning_does_no_harm_to_a_good_model() {
     );
 }
 
-/// Heights of the block's face beside that of the experiment \[m\]: every `step`-th of 13.
+/// Returns heights of the block's face relative to the experiment \[m\]: every `step`-th of 13.
 fn heights_m(step: usize) -> impl Iterator<Item = f64> {
     (-6..=6).step_by(step).map(|k| f64::from(k) * 1e-4)
 }
 
-/// The median stroke on a block whose face is `higher_m` higher.
+/// Returns the median stroke on a block whose face is `higher_m` higher.
 fn probing(learned: Option<LearnedTerms<4>>, stiffness_n_per_m: f64, higher_m: f64) -> Stroke {
     let (probe, duration_s) = scenario::probe(wam4().tip_radius_m());
     let mut plan = plan(Deviation::None, (Trajectory::Probe(probe), duration_s));
@@ -113,11 +113,11 @@ fn probing(learned: Option<LearnedTerms<4>>, stiffness_n_per_m: f64, higher_m: f
     median_stroke(&strokes(&plan).expect("probing runs"))
 }
 
-/// Peak, impact and force while pressing of probing with learning on, after a sinusoid has taught, are those without.
-/// The arm arrives at another speed where its free motion differs: an impact is compared by its impulse over the speed.
+/// Peak force, impact and pressing force of probing with learning, after a sinusoid, equal those without learning. Because the
+/// approach speed may differ, impacts are compared by impulse divided by speed.
 ///
-/// Means over blocks of several heights are compared: the force at the end of one soft stroke varies from 0.02 to 0.22 N with
-/// the height of the face, without learning too; the spring asks for 0.2 N. With learning it stays within that range.
+/// Means over blocks of several heights are compared: the force at the end of one soft stroke varies from 0.02 to 0.22 N with the
+/// height of the face, also without learning; the spring force is 0.2 N. With learning, the force stays within that range.
 #[test]
 fn contact_is_the_same_with_learning() {
     let (_, terms) = track(&plan(Deviation::None, sinusoid()));

@@ -1,5 +1,5 @@
-//! Controller and simulated arm over shared memory in virtual time: the results are bit-identical to those in
-//! one process, in every run.
+//! Tests controller and simulated arm through shared memory in virtual time: in every run, the results are bit-identical to those
+//! in one process.
 
 use core::time::Duration;
 use std::path::Path;
@@ -16,7 +16,7 @@ use supple_realtime::{Stop, pause};
 use supple_rt::{ControlLoop, loop_queues};
 use supple_sim::{SimulatedArm, run_simulation, simulation};
 
-/// Cycles of a run: the move to the start and a part of the sinusoid.
+/// Number of cycles of a run: the move to the start and a part of the sinusoid.
 const CYCLES: u64 = 5000;
 /// Cycles in which the move and the trajectory are requested.
 const MOVE_AT: u64 = 100;
@@ -92,7 +92,7 @@ fn over_shared_memory(folder: &Path) -> Vec<Telemetry> {
     telemetry
 }
 
-/// The telemetry without wall-clock times.
+/// Returns the telemetry without wall-clock times, as text.
 fn timeless(telemetry: &Telemetry) -> String {
     let mut telemetry = *telemetry;
     telemetry.timing = Default::default();

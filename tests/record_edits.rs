@@ -1,5 +1,5 @@
-//! A quantity is declared in one place: in a copy of the tree, a scalar and a torque term are added by two edits each,
-//! and logs, tables and telemetry have them.
+//! Tests that a quantity of the record is declared in one place: in a copy of the tree, a scalar and a torque term are added by
+//! two edits each, and logs, tables and telemetry contain them.
 
 #[path = "support/table.rs"]
 mod table;
@@ -11,7 +11,7 @@ use std::process::Command;
 use supple_log::{Reader, export_csv};
 use table::cells;
 
-/// A file, a text in it, and the lines that go behind it.
+/// Edit of a file: file, text in it, and lines to insert after the text.
 type Edit = (&'static str, &'static str, &'static str);
 
 const SCALAR: [Edit; 2] = [
@@ -55,8 +55,8 @@ fn copy_of_the_tree(to: &Path) {
     }
 }
 
-/// Gives the packages of the copy a version of their own, so that in the shared target folder none of them is taken for
-/// a package of this tree: cargo distinguishes members of a workspace by their path within it, not by its folder.
+/// Gives the packages of the copy another version, so that in the shared target folder cargo does not mistake them for packages
+/// of this tree: cargo distinguishes members of a workspace by their path within it.
 fn set_version(tree: &Path) {
     const OURS: &str = "version = \"0.1.0\"";
     const COPY: &str = "version = \"0.1.0-copy\"";
@@ -98,7 +98,7 @@ fn a_scalar_and_a_term_are_two_edits_each() {
         edit(&tree, change);
     }
     let log = folder.path().join("run.mcap");
-    // Beside the tests' own build: the dependencies of other projects are the same.
+    // The target folder is beside that of the tests, because the dependencies on other projects are the same.
     let target = Path::new(env!("CARGO_TARGET_TMPDIR"))
         .parent()
         .expect("the target folder");
@@ -118,7 +118,7 @@ fn a_scalar_and_a_term_are_two_edits_each() {
         .arg(&log)
         .status();
     assert!(written.expect("it runs").success());
-    // What publishes telemetry builds with them.
+    // The program that publishes telemetry builds with the new quantities.
     cargo("check", &["--bin", "supple-rt"]);
 
     let table = folder.path().join("table.csv");
@@ -137,7 +137,7 @@ fn a_scalar_and_a_term_are_two_edits_each() {
         assert_eq!((row[scalar], row[term]), ("0.5", "0.25"));
         rows += 1;
     }
-    // This version reads the log of that one, and leaves out what it does not have.
+    // This version reads the log of the edited version, and omits the quantities that it does not have.
     let steps = Reader::open(&log).and_then(|reader| reader.records::<4>());
     assert_eq!(steps.expect("a log").count(), rows);
     assert!(rows > 1000);

@@ -40,7 +40,7 @@ pub struct Arm {
 }
 
 impl Arm {
-    /// Creates the arm of a description.
+    /// Creates an arm from a description.
     pub fn new(description: Description) -> Result<Self, ModelError> {
         let dynamics: Result<Box<dyn Dynamics>, ModelError> = with_dof!(description.dof(), N => {
             let arm = description.arm::<N>()?;
@@ -53,18 +53,18 @@ impl Arm {
         })
     }
 
-    /// The description of the arm.
+    /// Returns the description of the arm.
     pub fn description(&self) -> &Description {
         &self.description
     }
 
-    /// The arm with everything that a controller needs. A `UserWarning` reports that settings were derived, unless only the
-    /// paths are placed.
+    /// Returns the description with every setting that a controller needs. A `UserWarning` reports derived settings, unless
+    /// only the places of the paths are derived.
     pub fn for_controller(&self, py: Python<'_>) -> PyResult<&Description> {
         complete::completed(py, &self.description, &self.completed)
     }
 
-    /// Description and law of the arm.
+    /// Returns description and law of the arm.
     fn law(&self) -> (&Description, &dyn BatchedLaw) {
         (&self.description, &*self.dynamics)
     }
@@ -896,7 +896,7 @@ impl Arm {
     }
 }
 
-/// The error with the remedies that arguments of `from_urdf` are.
+/// Replaces the remedies in an error by the arguments of `from_urdf`.
 fn with_arguments(error: ModelError) -> ModelError {
     match error {
         ModelError::Invalid(mut finding) => {

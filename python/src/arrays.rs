@@ -17,7 +17,7 @@ use supple_core::Vector;
 /// An array of float64.
 pub type Array<'py> = Bound<'py, PyArrayDyn<f64>>;
 
-/// Name and value of an argument.
+/// An argument: its name and its value.
 pub type Argument<'a, 'py> = (&'static str, &'a Bound<'py, PyAny>);
 
 /// Values of one argument: `width` for each state, or `width` for all states together.
@@ -29,7 +29,7 @@ pub struct States<'a> {
 }
 
 impl<'a> States<'a> {
-    /// The same values for all states.
+    /// Creates values that are the same for all states.
     pub fn constant(values: &'a [f64]) -> Self {
         States {
             values,
@@ -38,7 +38,7 @@ impl<'a> States<'a> {
         }
     }
 
-    /// The values of state `k` as a vector; zeros if it has fewer.
+    /// Returns the values of state `k` as a vector, filled with zeros if there are fewer.
     #[inline(always)]
     pub fn vector<const R: usize>(&self, k: usize) -> Vector<R> {
         self.at(k)
@@ -46,7 +46,7 @@ impl<'a> States<'a> {
             .map_or_else(Vector::zeros, |values| Vector::from(*values))
     }
 
-    /// The values of state `k`.
+    /// Returns the values of state `k`.
     #[inline]
     pub fn at(&self, k: usize) -> &'a [f64] {
         &self.values[k * self.stride..][..self.width]
@@ -75,10 +75,10 @@ impl<'py> Batch<'py> {
         Self::read_shaped(&shaped)
     }
 
-    /// As [`Batch::read`], for arguments of different shapes.
+    /// Reads arguments of different shapes, like [`Batch::read`].
     ///
     /// # Errors
-    /// As [`Batch::read`].
+    /// The same as those of [`Batch::read`].
     pub fn read_shaped(arguments: &[Shaped<'_, 'py>]) -> PyResult<Self> {
         let mut arrays = Vec::with_capacity(arguments.len());
         let mut batch: Option<(&'static str, Vec<usize>)> = None;
@@ -109,7 +109,7 @@ impl<'py> Batch<'py> {
         })
     }
 
-    /// The values of each argument.
+    /// Returns the values of each argument.
     pub fn states(&self) -> PyResult<Vec<States<'_>>> {
         let arguments = self.arguments.iter();
         let states = arguments.map(|(array, width, single)| {
@@ -132,7 +132,7 @@ fn slice<'a>(array: &'a PyReadonlyArrayDyn<'_, f64>) -> PyResult<&'a [f64]> {
     Ok(array.as_slice()?)
 }
 
-/// An argument as a float64 array in C order, without a copy if it already is one.
+/// Returns an argument as a float64 array in C order, without a copy if it already is one.
 ///
 /// # Errors
 /// `TypeError` if it is not numeric; `ValueError` for ragged lists and borrowed arrays.
@@ -182,10 +182,10 @@ fn type_name(value: &Bound<'_, PyAny>) -> String {
     name.map_or_else(|_| "another object".to_owned(), |name| name.to_string())
 }
 
-/// An array of exactly this shape.
+/// Returns an argument as an array of exactly this shape.
 ///
 /// # Errors
-/// As [`numbers`]; `ValueError` if the shape differs.
+/// The same as those of [`numbers`]; `ValueError` if the shape differs.
 pub fn fixed<'py>(
     name: &str,
     value: &Bound<'py, PyAny>,
@@ -198,7 +198,7 @@ pub fn fixed<'py>(
     Err(wrong_shape(name, &shape_text(shape), array.shape()))
 }
 
-/// The array for the results: `out`, or a new array.
+/// Returns the array for the results: `out`, or a new array.
 ///
 /// # Errors
 /// `TypeError` and `ValueError` if `out` is not a writable float64 array in C order of this shape.
@@ -237,12 +237,12 @@ pub fn output<'py>(
     Ok((array.clone(), writable))
 }
 
-/// A new array of `shape` that takes ownership of `values`.
+/// Creates an array of `shape` that takes ownership of `values`.
 pub fn array<'py>(py: Python<'py>, values: Vec<f64>, shape: &[usize]) -> PyResult<Array<'py>> {
     values.into_pyarray(py).reshape(shape.to_vec())
 }
 
-/// `ValueError` for an argument of unexpected shape.
+/// Creates the `ValueError` for an argument of unexpected shape.
 pub fn wrong_shape(name: &str, expected: &str, found: &[usize]) -> PyErr {
     PyValueError::new_err(format!(
         "{name}: expected shape {expected}, got {}",
@@ -250,7 +250,7 @@ pub fn wrong_shape(name: &str, expected: &str, found: &[usize]) -> PyErr {
     ))
 }
 
-/// A shape as Python prints a tuple.
+/// Returns a shape as Python prints a tuple.
 pub fn shape_text(shape: &[usize]) -> String {
     match shape {
         [one] => format!("({one},)"),

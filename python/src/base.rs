@@ -11,7 +11,7 @@ use supple_ident::regressor::rows;
 use supple_ident::{BaseParameters, Columns, DMatrix, DVector, FrictionColumns, IdentError, model};
 use supple_model::{ModelError, with_dof};
 
-/// Base parameters of the regressor stacked over given states.
+/// Computes the base parameters of the regressor stacked over given states.
 #[pyfunction]
 pub fn base_parameters<'py>(
     py: Python<'py>,

@@ -1,18 +1,18 @@
-//! Arguments of the native classes, checked by the package's module `_check`: the errors of both have one form.
+//! Checks of arguments of the native classes by the package's module `_check`, so that all errors have the same form.
 
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use std::convert::Infallible;
 use std::path::PathBuf;
 
-/// An argument before its check. Empty if the caller leaves it out, which a given `None` is not.
+/// An argument before its check. Empty if the caller omits it; a given `None` is not empty.
 pub struct Unchecked<'py>(Option<Bound<'py, PyAny>>);
 
 impl<'py> Unchecked<'py> {
-    /// The argument that the caller leaves out.
+    /// An omitted argument.
     pub const LEFT_OUT: Self = Self(None);
 
-    /// The checked argument, or its default.
+    /// Returns the checked argument, or its default.
     pub fn or<T>(
         &self,
         default: T,
@@ -30,7 +30,7 @@ impl<'py> FromPyObject<'_, 'py> for Unchecked<'py> {
     }
 }
 
-/// The value that a function of `_check` returns for the argument `name`.
+/// Returns the result of a function of `_check` for the argument `name`.
 fn checked<'py>(
     function: &str,
     name: &str,
@@ -40,27 +40,27 @@ fn checked<'py>(
     module.getattr(function)?.call1((name, value))
 }
 
-/// A path, or a `TypeError`.
+/// Returns a path, or a `TypeError`.
 pub fn path(name: &str, value: &Bound<'_, PyAny>) -> PyResult<PathBuf> {
     checked("path", name, value)?.extract()
 }
 
-/// Text, or a `TypeError`.
+/// Returns a text, or a `TypeError`.
 pub fn text(name: &str, value: &Bound<'_, PyAny>) -> PyResult<String> {
     checked("text", name, value)?.extract()
 }
 
-/// True or False, or a `TypeError`.
+/// Returns a bool, or a `TypeError`.
 pub fn flag(name: &str, value: &Bound<'_, PyAny>) -> PyResult<bool> {
     checked("flag", name, value)?.extract()
 }
 
-/// A finite number, zero or more; a `TypeError` for another type, a `ValueError` for another number.
+/// Returns a finite number, zero or more; a `TypeError` for another type, a `ValueError` for another number.
 pub fn number(name: &str, value: &Bound<'_, PyAny>) -> PyResult<f64> {
     checked("number", name, value)?.extract()
 }
 
-/// Finite numbers by name, of either sign; errors as of [`number`].
+/// Returns finite numbers of either sign by name; errors like [`number`].
 pub fn named_numbers(name: &str, value: &Bound<'_, PyAny>) -> PyResult<BTreeMap<String, f64>> {
     checked("named_numbers", name, value)?.extract()
 }

@@ -8,15 +8,15 @@ use std::sync::OnceLock;
 use supple_model::unlimited::{UNLIMITED_NM, UNLIMITED_RAD_PER_S};
 use supple_model::{Completed, Description, ModelError, with_dof};
 
-/// The arm with everything that a controller needs. A `UserWarning` reports that settings were
-/// derived, unless only the paths are placed.
+/// Returns the description with every setting that a controller needs. A `UserWarning` reports derived settings,
+/// unless only the places of the paths are derived.
 pub fn completed<'a>(
     py: Python<'_>,
     arm: &Description,
     known: &'a OnceLock<Completed>,
 ) -> PyResult<&'a Description> {
     let completed = of(py, arm, known)?;
-    // Where the arm does not reach the paper's paths, others are no guess about the arm.
+    // Paths elsewhere, where the arm does not reach the paper's, are no estimate of a property of the arm: no warning.
     let of_arm = completed.derived.iter();
     let derived = of_arm
         .filter(|derived| !derived.key.starts_with("[paths]"))
@@ -40,7 +40,7 @@ pub fn completed<'a>(
     Ok(&completed.description)
 }
 
-/// The arm with everything that a controller needs, and what was derived; `known` keeps it.
+/// Returns the description with every setting that a controller needs, and the derived settings; `known` caches both.
 pub fn of<'a>(
     py: Python<'_>,
     description: &Description,
@@ -61,7 +61,7 @@ pub fn of<'a>(
     Ok(known.get_or_init(|| completed))
 }
 
-/// A joint without limits of torque and speed, see [`supple_model::unlimited`].
+/// Returns a joint without limits of torque and speed, see [`supple_model::unlimited`].
 fn unlimited(description: &Description) -> Result<Option<&String>, ModelError> {
     with_dof!(description.dof(), N => {
         let limits = description.config::<N>()?.limits;

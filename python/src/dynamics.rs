@@ -53,13 +53,13 @@ pub trait Dynamics: BatchedLaw {
     /// order.
     fn evaluate(&self, quantity: Quantity, states: &[States<'_>], out: &mut [f64]);
 
-    /// Ten parameters for each link.
+    /// Returns ten parameters for each link.
     fn parameters(&self) -> Vec<f64>;
 
-    /// Rotor inertia of each joint \[kg m^2\].
+    /// Returns the rotor inertia of each joint \[kg m^2\].
     fn armature(&self) -> Vec<f64>;
 
-    /// Gravitational acceleration \[m/s^2\].
+    /// Returns the gravitational acceleration \[m/s^2\].
     fn gravity_m_per_s2(&self) -> [f64; 3];
 }
 
@@ -128,7 +128,7 @@ impl<const N: usize> Dynamics for Arm<N> {
 /// Number of states whose results are copied together.
 const CHUNK: usize = 16;
 
-/// A batch and the width of its results.
+/// A batch of states and the width of their results.
 struct Each<'a> {
     states: &'a [States<'a>],
     width: usize,
@@ -147,7 +147,7 @@ impl Each<'_> {
         }
     }
 
-    /// As [`Each::run`], for wide results with zeros that `f` need not write. Results are computed in a
+    /// Like [`Each::run`], for wide results with zeros that `f` need not write. Results are computed in a
     /// cache-resident buffer and copied in large blocks, so that the copy does not read the destination first.
     #[inline]
     fn run_in_chunks<const N: usize, const K: usize>(

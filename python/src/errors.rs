@@ -12,7 +12,7 @@ use supple_ident::{IdentError, SaveError};
 use supple_log::LogError;
 use supple_model::{Description, ModelError};
 
-/// `FileNotFoundError` and `OSError` for files that cannot be read, `ValueError` for invalid content.
+/// Converts an error: `FileNotFoundError` and `OSError` for files that cannot be read, `ValueError` for invalid content.
 pub fn model(error: ModelError) -> PyErr {
     match &error {
         ModelError::Read { error: cause, .. } | ModelError::Write { error: cause, .. } => {
@@ -22,7 +22,7 @@ pub fn model(error: ModelError) -> PyErr {
     }
 }
 
-/// A `UserWarning` for each URDF element that is not read; an error if the interpreter turns warnings into
+/// Raises a `UserWarning` for each URDF element that is not read; an error if the interpreter turns warnings into
 /// errors.
 pub fn warn(py: Python<'_>, description: &Description) -> PyResult<()> {
     let category = py.get_type::<PyUserWarning>();

@@ -199,17 +199,17 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// The nominal arm.
+    /// Returns the description of the nominal arm.
     pub fn description(&self) -> &Description {
         &self.of
     }
 
-    /// The fit.
+    /// Returns the fitted model.
     pub fn model(&self) -> &dyn Model {
         &*self.model
     }
 
-    /// The fitted logs, as prepared.
+    /// Returns the prepared logs that were fitted.
     pub fn fitted(&self) -> &[Motion] {
         &self.motions
     }

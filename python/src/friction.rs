@@ -52,7 +52,7 @@ pub struct Friction {
     pub inner: friction::Friction,
 }
 
-/// What a pickle calls, with its arguments.
+/// Function that a pickle calls, with its arguments.
 type Pickle<'py> = (Bound<'py, PyAny>, ([f64; 9], &'static str));
 
 #[pymethods]

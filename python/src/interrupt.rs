@@ -1,4 +1,4 @@
-//! Work without the interpreter lock, so that Ctrl-C acts meanwhile.
+//! Runs computations without the interpreter lock, so that Ctrl-C interrupts them.
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -7,13 +7,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
 use std::time::Duration;
 
-/// Interval between two looks for signals.
+/// Interval between two checks for signals.
 const SIGNAL_INTERVAL: Duration = Duration::from_millis(50);
 /// Stack of the worker: a controller of seven joints and its plant are values of tens of kilobytes.
 const STACK_BYTES: usize = 16 << 20;
 
-/// Runs `work` in a thread. If a signal handler raises, the flag that `work` has is set and the exception is returned at
-/// once; work that does not look at the flag ends by itself later, and its result is dropped.
+/// Runs `work` in a thread. If a signal handler raises, this sets the flag passed to `work` and returns the exception at
+/// once; work that does not read the flag ends later, and its result is dropped.
 pub fn interruptible<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce(&Arc<AtomicBool>) -> T + Send + 'static,

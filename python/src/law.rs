@@ -1,4 +1,4 @@
-//! The impedance law of [`supple_core::impedance`] over batches of states: its sum, or every term apart.
+//! The impedance law of [`supple_core::impedance`] over batches of states: the sum of its terms, or every term separately.
 //!
 //! The terms are those of the function that the controller runs in its modes track and track pose; the sum is
 //! their total.
@@ -17,7 +17,7 @@ use supple_core::torques::TERMS;
 use supple_core::{Arm, Friction, Matrix, Pose, Reference, Vector};
 use supple_model::Description;
 
-/// The terms that the law has, in the order of [`TERMS`]; the controller adds the others.
+/// Names of the law's terms, in the order of [`TERMS`]; the controller adds the other terms.
 pub const LAW_TERMS: [&str; 9] = [
     "gravity",
     "coriolis",
@@ -50,7 +50,7 @@ pub struct Given<'a, 'py> {
     pub force: Option<&'a Bound<'py, PyAny>>,
 }
 
-/// A batch of states with what the law is given for them.
+/// A batch of states with the arguments of the law.
 pub struct LawBatch<'a> {
     directions: usize,
     active_joints: &'a [bool],
@@ -66,7 +66,7 @@ pub struct LawBatch<'a> {
     nullspace_torque: Option<States<'a>>,
     /// Chosen inertia and measured force.
     apparent: Option<(States<'a>, States<'a>)>,
-    /// Indices in [`TERMS`] of the terms that are wanted apart; none for their sum.
+    /// Indices in [`TERMS`] of the terms to return separately; empty for their sum.
     apart: &'a [usize],
 }
 
@@ -82,7 +82,7 @@ enum Reason {
     ApparentInertia,
 }
 
-/// What the law adds up to: `(..., N)`.
+/// Returns the sum of the law's terms, `(..., N)`.
 pub fn torque<'py>(
     py: Python<'py>,
     (description, law): (&Description, &dyn BatchedLaw),
@@ -92,7 +92,7 @@ pub fn torque<'py>(
     evaluate(py, description, law, given, &[], out)
 }
 
-/// Every term of the law by its name, each `(..., N)`, in the order of the sum.
+/// Returns every term of the law by its name, each `(..., N)`, in the order of the sum.
 pub fn terms<'py>(
     py: Python<'py>,
     (description, law): (&Description, &dyn BatchedLaw),
@@ -203,7 +203,7 @@ fn evaluate<'py>(
     Ok(array)
 }
 
-/// Three for a reference that is a position, six for a pose.
+/// Returns three for a reference that is a position, six for a pose.
 fn directions(reference: &Bound<'_, PyAny>) -> PyResult<usize> {
     match arrays::numbers("reference", reference)?.shape() {
         [.., 4, 4] => Ok(6),
@@ -216,7 +216,7 @@ fn directions(reference: &Bound<'_, PyAny>) -> PyResult<usize> {
     }
 }
 
-/// The joints on which the law acts: as given, otherwise those of the arm.
+/// Returns the given active joints, or by default the arm's.
 fn active_joints(
     description: &Description,
     given: Option<&[bool]>,
@@ -243,7 +243,7 @@ fn active_joints(
     Ok(active_joints)
 }
 
-/// A gain, every number of it finite and zero or more; a single number is repeated `repeat` times, unless that is zero.
+/// Reads a gain and checks that every number is finite and zero or more; a single number is repeated `repeat` times, unless that is zero.
 fn gain<'py>(
     py: Python<'py>,
     name: &'static str,
@@ -270,7 +270,7 @@ fn gain<'py>(
     }
 }
 
-/// " at index (1, 2)" of an array of this shape; nothing for a single number.
+/// Returns a text such as " at index (1, 2)" for an array of this shape; empty for a single number.
 fn at_index(place: usize, shape: &[usize]) -> String {
     if shape.is_empty() {
         return String::new();
@@ -286,7 +286,7 @@ fn at_index(place: usize, shape: &[usize]) -> String {
 }
 
 impl Rejected {
-    /// The exception, for a batch of this shape.
+    /// Returns the exception, for a batch of this shape.
     fn error(&self, batch: &[usize]) -> PyErr {
         let index = at_index(self.state, batch);
         PyValueError::new_err(match self.reason {
@@ -305,7 +305,7 @@ impl Rejected {
     }
 }
 
-/// The law of an arm with any number of joints.
+/// Evaluates the law of an arm with any number of joints.
 pub trait BatchedLaw: Send + Sync {
     /// Writes the torque of every state to `out`, or one term of all states after the other.
     ///
@@ -325,7 +325,7 @@ impl<const N: usize> BatchedLaw for Arm<N> {
 
 /// Reference and gains of a state in `D` directions.
 trait TipTask<const D: usize>: Sized {
-    /// Of state `k`; `None` if its reference is not a pose.
+    /// Returns the task of state `k`; `None` if its reference is not a pose.
     fn at(batch: &LawBatch<'_>, k: usize) -> Option<Self>;
 
     fn target(&self) -> impl Target<D>;
@@ -409,7 +409,7 @@ fn halves(six: &Vector<6>) -> [Vector3<f64>; 2] {
     [0, 3].map(|first| six.fixed_rows::<3>(first).into_owned())
 }
 
-/// The pose of a homogeneous matrix, by rows; `None` if it is none.
+/// Returns the pose of a homogeneous matrix given by rows; `None` if the matrix is not a pose.
 fn pose(by_rows: &[f64]) -> Option<Pose> {
     let homogeneous = Matrix::<4, 4>::from_row_slice(by_rows);
     let rotation: Matrix3<f64> = homogeneous.fixed_view::<3, 3>(0, 0).into_owned();
@@ -431,7 +431,7 @@ fn each_state<T: TipTask<D>, const N: usize, const D: usize>(
 ) -> Result<(), Rejected> {
     let roles: [Role; N] = std::array::from_fn(|i| match batch.active_joints[i] {
         true => Role::Active,
-        // Their loop is not part of the law.
+        // The position loop of held joints is not part of the law.
         false => Role::Held {
             position_rad: 0.0,
             stiffness_nm_per_rad: 0.0,

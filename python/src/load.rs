@@ -62,7 +62,7 @@ pub fn payload<'py>(
     Ok(dict)
 }
 
-/// Ratio of true to logged torque of each moving joint; `None` if the known payload adds too little torque.
+/// Returns the ratio of true to logged torque of each moving joint; `None` if the known payload adds too little torque.
 #[pyfunction]
 pub fn torque_scale(
     py: Python<'_>,
@@ -76,7 +76,7 @@ pub fn torque_scale(
     found.map_err(errors::identification)
 }
 
-/// Harmonic, sine and cosine amplitude of every line of each motor.
+/// Returns harmonic, sine and cosine amplitude of every line of each motor.
 #[pyfunction]
 pub fn ripple(
     py: Python<'_>,

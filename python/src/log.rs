@@ -1,4 +1,4 @@
-//! A log as columns.
+//! Conversion of a log to columns.
 
 use crate::arm::Arm;
 use crate::errors;
@@ -11,7 +11,7 @@ use supple_core::record::{Cell, for_each_column};
 use supple_log::{CycleTiming, LogError, PlantTruth, Reader, TimedMessage};
 use supple_model::with_dof;
 
-/// What a log holds, before it has a form in Python.
+/// Content of a log, before its conversion to Python objects.
 struct Columns {
     steps: Table,
     modes: Vec<&'static str>,
@@ -84,7 +84,7 @@ fn sized<const N: usize>(reader: &Reader) -> Result<Columns, LogError> {
     Ok(columns)
 }
 
-/// Every field of a record under its name, the terms of the torque as `torques.<term>`; texts and lists are not numbers.
+/// Adds every numeric field of a record under its name, the terms of the torque as `torques.<term>`; no texts and lists.
 pub fn step<const N: usize>(table: &mut Table, t: f64, record: &CycleRecord<N>) {
     table.number("t", t);
     let mut words = vec![0; CycleRecord::<N>::words(N)];

@@ -10,16 +10,16 @@ use supple_plant::PlantOptions;
 /// Name of options that were given as a dictionary, in errors.
 const DICTIONARY: &str = "plant_options";
 
-/// Plant options from Python: `None`, a path, or a dictionary of numbers. What is wrong with them is kept until they are
-/// used: an error of the conversion would become a TypeError of all options.
+/// Plant options from Python: `None`, a path, or a dictionary of numbers. An error in them is kept until they are
+/// used: as an error of the conversion it would become a TypeError of all options.
 pub struct PlantEffects {
-    /// The options; the default if they are wrong.
+    /// The options; the default if they are invalid.
     pub options: PlantOptions,
     error: Option<String>,
 }
 
 impl PlantEffects {
-    /// A ValueError if the options are wrong.
+    /// Returns a ValueError if the options are invalid.
     pub fn check(&self) -> PyResult<()> {
         match &self.error {
             None => Ok(()),
@@ -64,13 +64,13 @@ impl<'py> FromPyObject<'_, 'py> for PlantEffects {
     }
 }
 
-/// The name of the realistic set of `arm`.
+/// Returns the name of the realistic set of `arm`.
 #[pyfunction]
 pub fn realistic_set(arm: PyRef<'_, Arm>) -> &'static str {
     PlantOptions::realistic_name_of(arm.description())
 }
 
-/// The set of options `name` as a dictionary.
+/// Returns the set of options `name` as a dictionary.
 #[pyfunction]
 pub fn plant_options<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyDict>> {
     let error = |error: supple_plant::PlantOptionsError| PyValueError::new_err(error.to_string());

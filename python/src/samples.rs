@@ -1,7 +1,7 @@
 //! Conversion of NumPy logs for identification.
 //!
-//! A log with velocities and accelerations is a list of states: nothing is differentiated, and its rows are used as
-//! they are unless a filter, a rate or a decimation is asked for.
+//! A log with velocities and accelerations is a list of states: nothing is differentiated, and its rows are used
+//! unchanged unless a filter, a rate or a decimation is given.
 
 use crate::arrays;
 use numpy::{PyReadonlyArrayDyn, PyUntypedArrayMethods};
@@ -57,9 +57,8 @@ impl Samples {
         })
     }
 
-    /// Checks and prepares the log.
-    /// As [`Samples::motion`], checked against the given arm and with the delay of its torques estimated, unless rows
-    /// are used as they are.
+    /// Prepares the log like [`Samples::motion`], checks it against the given arm and estimates the delay of its torques,
+    /// unless rows are used unchanged.
     pub fn checked_motion<const N: usize>(
         &self,
         arm: &Arm<N>,

@@ -1,4 +1,4 @@
-//! An experiment of `supple-experiment`, returned as columns.
+//! Runs an experiment of `supple-experiment` and returns it as columns.
 
 use crate::arm::Arm;
 use crate::errors;

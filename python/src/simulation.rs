@@ -1,5 +1,5 @@
-//! Controller and simulated arm in this process, one cycle at a time, with the interface of a connection to a running
-//! system: waiting is what runs it.
+//! Controller and simulated arm in this process, with the interface of a connection to a running system: the simulation
+//! runs, cycle by cycle, while a caller waits.
 
 use crate::arm::Arm;
 use crate::errors;
@@ -21,7 +21,7 @@ use supple_plant::Scene;
 
 /// Number of cycles that are kept.
 const HISTORY: usize = 8192;
-/// Number of cycles between two looks for signals.
+/// Number of cycles between two checks for signals.
 const SIGNAL_CHECK: u32 = 1000;
 /// Time in gravity hold before the first request \[s\].
 const SETTLE_S: f64 = 0.2;
@@ -39,7 +39,7 @@ pub struct Options {
     plant_options: PlantEffects,
 }
 
-/// A cycle that is done, and why its request was refused.
+/// A completed cycle, and the reason if its request was refused.
 struct Done {
     telemetry: Telemetry,
     mode: &'static str,
@@ -66,7 +66,7 @@ impl<const N: usize> Cycles for SizedSystem<N> {
         };
         let names = self.rig.controller().config().joint_names;
         let named = |refusal: &Refusal| refusal.with_names(names.as_slice()).to_string();
-        // As the helper of supple-rt does, before the loop sees it.
+        // The helper thread of supple-rt does the same before it passes the request to the loop.
         let checked = request.as_ref().map_or(Ok(()), |request| {
             check_motion(self.rig.controller(), &self.position_rad, request)
         });
@@ -296,7 +296,7 @@ impl Simulation {
             acceleration_m_per_s2: Vector3::from(acceleration_m_per_s2),
             at_cycle,
         };
-        // The code of a request without joints is that of any arm.
+        // A request without joint values has the same code for all arms.
         let code = RequestCode::new(Some(&Request::<3>::SetPoint(set_point)));
         self.lock().set_point = Some(code);
     }

@@ -53,7 +53,7 @@ impl Table {
         self.next += 1;
     }
 
-    /// The columns by name, `(rows,)` or `(rows, width)`.
+    /// Returns the columns by name, `(rows,)` or `(rows, width)`.
     pub fn into_dict(self, py: Python<'_>) -> PyResult<Bound<'_, PyDict>> {
         let dict = PyDict::new(py);
         for column in self.columns {

@@ -1,35 +1,35 @@
-//! The files of the workspace and what each imports from another one of the same crate: by `use`, by `pub use`, by a path
-//! in the code, of a parent, a child or a sibling. A name is followed through re-exports to the file that declares it.
-//! Imports between crates are not here: cargo rejects a cycle of them.
+//! Finds for each file of the workspace the files of the same crate from which it imports: by `use`, by `pub use`, or by a
+//! path in the code to a parent, a child or a sibling. Follows a name through re-exports to the file that declares it. Ignores
+//! imports between crates, because cargo rejects cyclic dependencies of crates.
 
 use proc_macro2::{TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use syn::visit::{self, Visit};
 
-/// A module: its file, what it declares, and what it names.
+/// A module: its file, its declarations and the paths in it.
 #[derive(Default)]
 struct Module {
     file: PathBuf,
     parent: Option<usize>,
     children: BTreeMap<String, usize>,
     declared: BTreeSet<String>,
-    /// Names that `use` brings, with their paths.
+    /// Names that `use` imports, with their paths.
     used: BTreeMap<String, Vec<String>>,
-    /// Paths whose names are all brought by `use path::*`.
+    /// Paths from which `use path::*` imports all names.
     globs: Vec<Vec<String>>,
-    /// Every path that the code names.
+    /// Every path in the code.
     paths: BTreeSet<Vec<String>>,
 }
 
 /// The modules of one target, the root first.
 pub struct Modules {
     all: Vec<Module>,
-    /// Macros of `#[macro_export]`, which are named below the root, and their files.
+    /// Macros with `#[macro_export]`, whose paths begin at the root, and their files.
     exported: BTreeMap<String, PathBuf>,
 }
 
-/// What a path names.
+/// Item that a path resolves to.
 enum Named {
     Module(usize),
     Item,
@@ -47,7 +47,7 @@ impl Modules {
         modules
     }
 
-    /// Files and the files that each imports from, without itself.
+    /// Returns for each file the other files from which it imports.
     pub fn imports(&self) -> BTreeMap<PathBuf, BTreeSet<PathBuf>> {
         let mut imports = BTreeMap::<PathBuf, BTreeSet<PathBuf>>::new();
         for (at, module) in self.all.iter().enumerate() {
@@ -126,7 +126,7 @@ impl Modules {
         at
     }
 
-    /// Adds the files in which a path of a module is looked up to `files`; `None` if it begins with none of the crate.
+    /// Resolves a path in a module and adds the files on the way to `files`; `None` if the path is not in the crate.
     fn resolve(
         &self,
         from: usize,
@@ -157,7 +157,7 @@ impl Modules {
                     }
                     if let Some(used) = module.used.get(name).filter(|used| path != *used) {
                         search.depth += 1;
-                        assert!(search.depth < 256, "{path:?} leads to itself");
+                        assert!(search.depth < 256, "{path:?} refers to itself");
                         match self.resolve(at, used, files, search)? {
                             Named::Module(found) => at = found,
                             Named::Item => return Some(Named::Item),
@@ -172,7 +172,7 @@ impl Modules {
                         Some(Named::Item) => return Some(Named::Item),
                         None => {}
                     }
-                    // Of another crate, or of the language, unless a macro of that module declares it.
+                    // The name is of another crate or of the language, unless a macro of that module declares it.
                     if !first {
                         files.insert(module.file.clone());
                     }
@@ -184,7 +184,7 @@ impl Modules {
         Some(Named::Module(at))
     }
 
-    /// What a name is that a module has by `use path::*` alone; adds the file that declares an item to `files`.
+    /// Resolves a name that a module has only by `use path::*`; adds the file that declares it to `files`.
     fn through_globs(
         &self,
         at: usize,
@@ -210,16 +210,16 @@ impl Modules {
     }
 }
 
-/// How a name is looked up.
+/// State of the resolution of a name.
 #[derive(Default)]
 struct Search {
-    /// Modules with the names that are looked up in what they glob: modules that glob each other have a name from neither.
+    /// Modules and names whose resolution through globs has begun, so that modules that glob each other cause no endless loop.
     begun: BTreeSet<(usize, String)>,
     /// Number of re-exports followed.
     depth: usize,
 }
 
-/// Values of `#[path = ".."]` and of `#[cfg_attr(.., path = "..")]`.
+/// Returns the values of `#[path = ".."]` and of `#[cfg_attr(.., path = "..")]`.
 fn paths_of(attributes: &[syn::Attribute]) -> Vec<String> {
     let mut paths = Vec::new();
     for attribute in attributes {
@@ -247,7 +247,7 @@ fn paths_of(attributes: &[syn::Attribute]) -> Vec<String> {
     paths
 }
 
-/// Collects what the items of a module declare and name.
+/// Collects the declarations and paths in the items of a module.
 struct Reader<'a> {
     module: &'a mut Module,
 }
@@ -300,7 +300,7 @@ impl Reader<'_> {
         self.module.used.insert(name, path);
     }
 
-    /// Paths inside a macro's tokens: names joined by `::`.
+    /// Finds the paths in a macro's tokens: names joined by `::`.
     fn tokens(&mut self, tokens: TokenStream) {
         let mut path = Vec::<String>::new();
         let mut colons = 0;
@@ -364,7 +364,7 @@ impl<'ast> Visit<'ast> for Reader<'_> {
     fn visit_vis_restricted(&mut self, _: &'ast syn::VisRestricted) {}
 }
 
-/// Files of a Python package and the files that each imports from: `from supple._log import Log`, `from supple import
+/// Returns for each file of a Python package the files from which it imports: `from supple._log import Log`, `from supple import
 /// _native`, `from . import ..`.
 pub fn python_imports(package: &Path) -> BTreeMap<PathBuf, BTreeSet<PathBuf>> {
     let name = package.file_name().expect("a name").to_string_lossy();
@@ -393,7 +393,7 @@ pub fn python_imports(package: &Path) -> BTreeMap<PathBuf, BTreeSet<PathBuf>> {
             let inner = from.strip_prefix(&*name).unwrap_or(from);
             match inner.strip_prefix('.') {
                 Some(module) if !module.is_empty() => found.extend(file_of(module)),
-                // Of the package itself: a module, or a name that `__init__.py` has.
+                // An import from the package itself is of a module or of a name in `__init__.py`.
                 _ if from == name || from == "." => {
                     let names = names.split([',', '(', ')']).map(str::trim);
                     let names = names.filter(|name| !name.is_empty() && *name != "_native");
@@ -415,7 +415,7 @@ mod tests {
     use super::Modules;
     use std::collections::BTreeSet;
 
-    /// Files of a target of `a.rs`, `b/mod.rs` and `b/c.rs`, and what `a` and `c` import.
+    /// Creates a target of `a.rs`, `b/mod.rs` and `b/c.rs`; returns the files from which each imports.
     fn imports(a: &str, b: &str, c: &str) -> [BTreeSet<String>; 3] {
         let folder = tempfile::tempdir().expect("a folder");
         let root = folder.path();
@@ -453,7 +453,7 @@ mod tests {
     }
 
     #[test]
-    fn parents_paths_and_macros_are_seen() {
+    fn imports_from_parents_by_path_and_in_macros_are_found() {
         let [a, b, c] = imports(
             "fn f() { println!(\"{}\", crate::b::c::LIMIT) } macro_rules! m { () => { super::b::one() } }",
             "pub mod c; pub use c::Thing; pub fn one() {}",
@@ -465,7 +465,7 @@ mod tests {
     }
     #[test]
     fn a_name_is_followed_through_globs() {
-        // By `pub use x::*`, by `use x::*` in between, and with a module that is globbed too.
+        // The name comes through `pub use x::*`, an intermediate `use x::*`, and a module that is also imported by a glob.
         let [a, b, c] = imports(
             "use crate::b::{Thing, LIMIT}; fn f() { crate::b::inner::Deep; }",
             "mod c; pub use c::*;",
@@ -477,8 +477,8 @@ mod tests {
     }
 
     #[test]
-    fn globs_of_each_other_end() {
-        // A name that neither has, one that the language has, and one that the parent has.
+    fn modules_that_glob_each_other_are_resolved() {
+        // The names are one that neither module has, one of the language, and one of the parent.
         let [a, b, c] = imports(
             "pub fn one() {}",
             "mod c; pub use c::*; use crate::a::*; pub struct Parent; fn f() { one() }",

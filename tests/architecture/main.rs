@@ -21,11 +21,11 @@ fn metadata() -> serde_json::Value {
     serde_json::from_slice(&output.stdout).expect("cargo metadata prints JSON")
 }
 
-/// Dependencies of a crate on crates of the workspace: always, and of its tests alone.
-type Arrows = [BTreeSet<String>; 2];
+/// Dependencies of a crate on crates of the workspace: of the crate, and only of its tests.
+type Dependencies = [BTreeSet<String>; 2];
 
-/// Arrows of every crate, from its manifest.
-fn arrows() -> BTreeMap<String, Arrows> {
+/// Dependencies of every crate, from its manifest.
+fn dependencies() -> BTreeMap<String, Dependencies> {
     let metadata = metadata();
     let packages = metadata["packages"].as_array().expect("packages");
     let name = |value: &serde_json::Value| value["name"].as_str().unwrap_or_default().to_owned();
@@ -45,8 +45,8 @@ fn arrows() -> BTreeMap<String, Arrows> {
     packages.map(of).collect()
 }
 
-/// Arrows of every crate, from the table in ARCHITECTURE.md.
-fn documented_arrows() -> BTreeMap<String, Arrows> {
+/// Dependencies of every crate, from the table in ARCHITECTURE.md.
+fn documented_dependencies() -> BTreeMap<String, Dependencies> {
     let text = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/ARCHITECTURE.md"));
     let text = text.expect("a document");
     let names = |list: &str| {
@@ -72,11 +72,14 @@ fn documented_arrows() -> BTreeMap<String, Arrows> {
 
 #[test]
 fn documented_dependencies_are_the_real_ones() {
-    let (documented, real) = (documented_arrows(), arrows());
-    let names = |map: &BTreeMap<String, Arrows>| map.keys().cloned().collect::<Vec<_>>();
+    let (documented, real) = (documented_dependencies(), dependencies());
+    let names = |map: &BTreeMap<String, Dependencies>| map.keys().cloned().collect::<Vec<_>>();
     assert_eq!(names(&documented), names(&real), "crates");
-    for (package, arrows) in real {
-        assert_eq!(documented[&package], arrows, "{package}: documented, real");
+    for (package, dependencies) in real {
+        assert_eq!(
+            documented[&package], dependencies,
+            "{package}: documented, real"
+        );
     }
 }
 
@@ -93,7 +96,7 @@ const LAYERS: [&str; 9] = [
     "sizes",
 ];
 
-/// Root files of all targets of the workspace; of the build scripts, none.
+/// Returns the root files of all targets of the workspace, except build scripts.
 fn targets() -> Vec<PathBuf> {
     let metadata = metadata();
     let packages = metadata["packages"].as_array().expect("packages").iter();
@@ -170,7 +173,7 @@ fn core_depends_only_on_mathematical_crates() {
     );
 }
 
-/// Dependencies of a crate on other projects, its own and those of the crates of the workspace that it needs.
+/// Returns the dependencies of a crate on other projects, including those through crates of the workspace.
 fn foreign_dependencies(of: &str) -> BTreeSet<String> {
     let metadata = metadata();
     let packages = metadata["packages"].as_array().expect("packages");
@@ -191,7 +194,7 @@ fn foreign_dependencies(of: &str) -> BTreeSet<String> {
 }
 
 #[test]
-fn the_operator_links_no_plotter_and_the_reports_no_running_system() {
+fn supple_links_no_plotting_library_and_supple_report_no_shared_memory_or_bus() {
     let (operator, report) = (
         foreign_dependencies("supple"),
         foreign_dependencies("supple-report"),
@@ -206,10 +209,10 @@ fn the_operator_links_no_plotter_and_the_reports_no_running_system() {
     }
 }
 
-/// If the default build contained the freestanding program, plain `cargo build` would fail or, worse, abort on panic
-/// everywhere; if it contained the Python package, it would need an interpreter.
+/// With the freestanding program in the default build, `cargo build` would fail, or compile all crates to abort on panic. With
+/// the Python package, it would need an interpreter.
 #[test]
-fn only_the_freestanding_program_and_the_python_package_stay_out_of_the_default_build() {
+fn the_default_build_excludes_only_the_freestanding_program_and_the_python_package() {
     let metadata = metadata();
     let ids = |list: &str| -> BTreeSet<String> {
         let ids = metadata[list].as_array().expect("package ids").iter();
@@ -241,7 +244,7 @@ fn every_crate_uses_the_workspace_lints() {
 }
 
 #[test]
-fn core_and_protocol_have_neither_std_nor_unsafe_code() {
+fn core_and_protocol_crates_use_no_std_and_no_unsafe_code() {
     for package in [
         "supple-core",
         "supple-can-frame",
@@ -291,7 +294,7 @@ fn links_in_the_documents_have_targets() {
     }
 }
 
-/// Anchor of a heading: its words in lower case, joined by hyphens.
+/// Returns the anchor of a heading: its words in lower case, joined by hyphens.
 fn heading_anchor(line: &str) -> Option<String> {
     let words = line.strip_prefix('#')?.trim_start_matches('#').trim();
     let anchor = words.to_lowercase().replace(' ', "-");

@@ -1,9 +1,9 @@
-//! Effect of every injected fault on the emulated motors: which torque acts and how soon. The arm never becomes
-//! stiffer.
+//! Tests of the effect of every injected fault on the emulated motors: which torque acts, and after what time. The arm never
+//! becomes stiffer.
 
 use crate::rig::{MS, Rig, TestBus};
 use supple_bus::virtual_time::EmulatedNodes;
-use supple_bus::{FaultKind, FaultRule, Traffic};
+use supple_bus::{FaultKind, FaultRule, TrafficDirection};
 use supple_can_frame::CanId;
 use supple_core::Vector;
 use supple_core::controller::{Fault, Mode, Request};
@@ -34,7 +34,7 @@ fn fault_injector(rig: &mut Rig<4>) -> &mut TestBus<4> {
     rig.cycle.drive_mut().bus_mut()
 }
 
-/// Time from `begin_ns` until the motors became idle \[ns\].
+/// Returns the time from `begin_ns` until the motors became idle \[ns\].
 fn idle_after_ns(rig: &Rig<4>, begin_ns: u64) -> Option<u64> {
     let arm_events = rig.emulator().arm_events().iter();
     let mut idle =
@@ -52,7 +52,7 @@ fn assert_idle_in_time(rig: &Rig<4>, begin_ns: u64) {
     );
 }
 
-/// Motor torques that hold the arm's weight in its current pose.
+/// Returns the motor torques that hold the arm's weight in its current pose.
 fn weight_nm(rig: &Rig<4>) -> Vector<4> {
     let config = crate::rig::description(4).config::<4>().unwrap();
     let q = rig.emulator().truth().position_rad;
@@ -73,7 +73,7 @@ fn nonfinite_torques_lead_to_the_fallback_torque_and_then_to_braking() {
     assert_idle_in_time(&rig, begin_ns);
     assert_eq!(
         rig.cycle.guard().last_loss().map(|(loss, _)| loss),
-        Some(LossReason::Answer)
+        Some(LossReason::NoAnswer)
     );
     assert!(rig.cycle.counters().unusable >= 10);
 }
@@ -95,8 +95,11 @@ fn a_dead_controller_leads_to_the_fallback_torque_and_then_to_braking() {
     }
     assert_idle_in_time(&rig, begin_ns);
     assert_eq!(rig.emulator().safety().cause(), Cause::Host);
-    assert_eq!(rig.cycle.guard().last_loss().unwrap().0, LossReason::Answer);
-    // After this the motors only brake.
+    assert_eq!(
+        rig.cycle.guard().last_loss().unwrap().0,
+        LossReason::NoAnswer
+    );
+    // After this, the motors only brake.
     rig.run(300);
     assert!(rig.emulator().pucks().iter().all(|p| p.torque_nm() == 0.0));
 }
@@ -123,7 +126,7 @@ fn the_arm_is_reenabled_only_from_the_pendant() {
     assert!(rig.motors_in(MotorMode::Idle));
     rig.cycle.link_mut().dead = false;
     rig.run(5);
-    // Only the operator can re-enable the safety module.
+    // Only the operator can activate the safety module again.
     rig.request(Request::Reset);
     rig.run(300);
     assert!(rig.motors_in(MotorMode::Idle));
@@ -139,7 +142,8 @@ fn the_arm_is_reenabled_only_from_the_pendant() {
 fn one_lost_reply_is_tolerated() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
-    let rule = FaultRule::always(Traffic::Received, FaultKind::Loss).only(is_reply_of_puck_2);
+    let rule =
+        FaultRule::always(TrafficDirection::Received, FaultKind::Loss).only(is_reply_of_puck_2);
     fault_injector(&mut rig).add(rule.within(now_ns, now_ns + MS));
     rig.run(100);
     assert_eq!(rig.cycle.counters().replies_lost, 1);
@@ -151,7 +155,8 @@ fn one_lost_reply_is_tolerated() {
 fn a_lost_encoder_ends_torque_at_once() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
-    let rule = FaultRule::always(Traffic::Received, FaultKind::Loss).only(is_reply_of_puck_2);
+    let rule =
+        FaultRule::always(TrafficDirection::Received, FaultKind::Loss).only(is_reply_of_puck_2);
     fault_injector(&mut rig).add(rule.within(now_ns, u64::MAX));
     rig.step();
     let action = rig.step();
@@ -161,7 +166,7 @@ fn a_lost_encoder_ends_torque_at_once() {
     assert_idle_in_time(&rig, now_ns);
     assert_eq!(
         rig.cycle.guard().last_loss().unwrap().0,
-        LossReason::Encoder(1)
+        LossReason::EncoderLost(1)
     );
     // Joints 2 and 3 depend on this motor; the other angles are still known.
     let known = rig.cycle.link_mut().report.unwrap().position_rad;
@@ -172,7 +177,8 @@ fn a_lost_encoder_ends_torque_at_once() {
 fn one_lost_torque_frame_is_detected_in_its_cycle_and_does_not_end_torque() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
-    let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss).only(is_torque_frame);
+    let rule =
+        FaultRule::always(TrafficDirection::Sent, FaultKind::SilentLoss).only(is_torque_frame);
     fault_injector(&mut rig).add(rule.within(now_ns, now_ns + MS));
     rig.step();
     assert_eq!(rig.cycle.counters().tx_lost, 1);
@@ -185,7 +191,8 @@ fn one_lost_torque_frame_is_detected_in_its_cycle_and_does_not_end_torque() {
 fn unsent_torque_frames_set_the_module_to_idle() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
-    let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss).only(is_torque_frame);
+    let rule =
+        FaultRule::always(TrafficDirection::Sent, FaultKind::SilentLoss).only(is_torque_frame);
     fault_injector(&mut rig).add(rule.within(now_ns, u64::MAX));
     rig.step();
     assert_eq!(rig.cycle.counters().tx_lost, 1);
@@ -193,7 +200,7 @@ fn unsent_torque_frames_set_the_module_to_idle() {
     assert_idle_in_time(&rig, now_ns);
     assert_eq!(
         rig.cycle.guard().last_loss().unwrap().0,
-        LossReason::Transmit
+        LossReason::NotTransmitted
     );
 }
 
@@ -202,13 +209,13 @@ fn unsent_torque_frames_set_the_module_to_idle() {
 fn the_safety_module_detects_a_host_that_cannot_transmit() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
-    let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss);
+    let rule = FaultRule::always(TrafficDirection::Sent, FaultKind::SilentLoss);
     fault_injector(&mut rig).add(rule.within(now_ns, u64::MAX));
     rig.step();
     assert!(rig.cycle.counters().tx_lost >= 2);
     let before = rig.history.last().unwrap().1;
     rig.run(90);
-    // Meanwhile the motors keep the last torque, so that the arm does not become stiffer.
+    // Until then, the motors keep the last torque, so that the arm does not become stiffer.
     assert_eq!(rig.history.last().unwrap().1, before);
     rig.run(30);
     assert!(rig.motors_in(MotorMode::Idle));
@@ -219,7 +226,7 @@ fn the_safety_module_detects_a_host_that_cannot_transmit() {
 fn after_bus_off_the_host_sets_the_module_to_idle() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
-    let off = FaultRule::always(Traffic::Sent, FaultKind::BusOff);
+    let off = FaultRule::always(TrafficDirection::Sent, FaultKind::BusOff);
     fault_injector(&mut rig).add(off.within(now_ns + 300_000, now_ns + 30 * MS));
     rig.run(30);
     assert!(rig.motors_in(MotorMode::Torque));
@@ -244,7 +251,7 @@ fn a_corrupted_reply_is_accepted_or_ends_torque() {
             |id| id.raw() == 0x463,
             |id| id.raw() == 0x483,
         ];
-        let rule = FaultRule::always(Traffic::Received, FaultKind::Corrupt);
+        let rule = FaultRule::always(TrafficDirection::Received, FaultKind::Corrupt);
         let rule = rule.only(is_reply_of_puck[seed as usize % 4]);
         fault_injector(&mut rig).add(rule.within(now_ns, now_ns + MS));
         let from = rig.history.len() - 1;
@@ -301,7 +308,7 @@ fn a_corrupted_reply_is_accepted_or_ends_torque() {
 fn duplicated_and_reordered_frames_have_no_effect() {
     for kind in [FaultKind::Duplicate, FaultKind::Reorder(20_000)] {
         let mut rig = Rig::<4>::holding();
-        fault_injector(&mut rig).add(FaultRule::always(Traffic::Received, kind));
+        fault_injector(&mut rig).add(FaultRule::always(TrafficDirection::Received, kind));
         rig.run(300);
         assert_eq!(rig.cycle.guard().stage(), Stage::Active, "{kind:?}");
         assert_eq!(rig.cycle.counters().replies_lost, 0, "{kind:?}");
@@ -313,8 +320,8 @@ fn duplicated_and_reordered_frames_have_no_effect() {
 fn late_replies_count_as_lost() {
     let mut rig = Rig::<4>::holding();
     let now_ns = rig.now_ns();
-    let rule =
-        FaultRule::always(Traffic::Received, FaultKind::Delay(900_000)).only(is_reply_of_puck_2);
+    let rule = FaultRule::always(TrafficDirection::Received, FaultKind::Delay(900_000))
+        .only(is_reply_of_puck_2);
     fault_injector(&mut rig).add(rule.within(now_ns, now_ns + MS));
     rig.run(50);
     assert_eq!(rig.cycle.counters().replies_lost, 1);
@@ -380,7 +387,8 @@ fn shutdown_sets_the_module_to_idle_first() {
 fn without_the_module_the_motors_are_set_to_idle_directly() {
     let mut rig = Rig::<4>::holding();
     let begin_ns = rig.now_ns();
-    let rule = FaultRule::always(Traffic::Sent, FaultKind::Loss).only(is_request_to_module);
+    let rule =
+        FaultRule::always(TrafficDirection::Sent, FaultKind::Loss).only(is_request_to_module);
     fault_injector(&mut rig).add(rule.within(begin_ns, u64::MAX));
     rig.cycle.link_mut().dead = true;
     rig.run(105);
@@ -398,9 +406,13 @@ fn a_silent_module_ends_torque() {
     let mut rig = Rig::<4>::holding();
     let begin_ns = rig.now_ns();
     let is_reply_of_module = |id: CanId| id.raw() == 0x546;
-    let rule = FaultRule::always(Traffic::Received, FaultKind::Loss).only(is_reply_of_module);
+    let rule =
+        FaultRule::always(TrafficDirection::Received, FaultKind::Loss).only(is_reply_of_module);
     fault_injector(&mut rig).add(rule.within(begin_ns, u64::MAX));
     rig.run(150);
-    assert_eq!(rig.cycle.guard().last_loss().unwrap().0, LossReason::Module);
+    assert_eq!(
+        rig.cycle.guard().last_loss().unwrap().0,
+        LossReason::SafetyModuleSilent
+    );
     assert_eq!(rig.emulator().safety().mode(), SafetyMode::Idle);
 }

@@ -1,5 +1,5 @@
-//! `supple-can` with the emulated arm, in one process and in virtual time: start-up, normal operation, and the
-//! effect of every injected fault on the emulated motors.
+//! Tests of `supple-can` with the emulated arm, in one process and in virtual time: start-up, normal operation, and the effect
+//! of every injected fault on the emulated motors.
 
 mod damiao;
 mod faults;

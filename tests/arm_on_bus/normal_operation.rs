@@ -1,4 +1,4 @@
-//! Normal operation: activation, trajectory tracking, and the load of the bus.
+//! Tests of normal operation: activation, trajectory tracking, and bus load.
 
 use crate::rig::{MS, PERIOD_NS, Rig};
 use supple_bus::virtual_time::EmulatedNodes;
@@ -24,7 +24,7 @@ fn torque_mode_is_entered_only_from_the_pendant() {
     assert_eq!(rig.cycle.drives(), Drives::Active);
 }
 
-/// The weight is compensated from the moment of activation on: no joint moves.
+/// The weight is compensated from the activation on: no joint moves.
 #[test]
 fn activation_is_bumpless() {
     let mut rig = Rig::<4>::new();
@@ -56,11 +56,11 @@ fn reported_positions_and_force_match_the_arm() {
     let report = rig.cycle.link_mut().report.unwrap();
     let truth = rig.emulator().truth().position_rad;
     for (measured, truth) in report.position_rad.iter().zip(truth.iter()) {
-        // Half a count of each motor of the joint, and the motion within a cycle.
+        // The tolerance is half a count of each motor of the joint, plus the motion within a cycle.
         assert!((measured.unwrap() - truth).abs() < 2e-4);
     }
     let force_n = report.tip_force_n.unwrap();
-    assert!(force_n.norm() < 0.1, "nothing touches the tip: {force_n}");
+    assert!(force_n.norm() < 0.1, "no contact at the tip: {force_n}");
 }
 
 /// Request, four replies and torques take 450 us without bit stuffing and 540 us with the maximum; the auxiliary polls
@@ -114,7 +114,7 @@ fn assert_within_budget<const N: usize>(period_ns: u64) {
     }
     let allowed_ns = budget.min_period_ns() - budget.answer_ns;
     assert!(max_ns <= allowed_ns, "{max_ns} {allowed_ns}");
-    // The cycles polled the sensor, too.
+    // The cycles also polled the sensor.
     assert!(rig.cycle.link_mut().report.unwrap().tip_force_n.is_some());
     assert_eq!(rig.cycle.counters().tx_lost, 0);
 }

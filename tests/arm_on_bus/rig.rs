@@ -63,17 +63,17 @@ pub struct Rig<const N: usize> {
 }
 
 impl<const N: usize> Rig<N> {
-    /// An arm after start-up, with idle motors.
+    /// Creates an arm after start-up, with idle motors.
     pub fn new() -> Rig<N> {
         Rig::seeded(1)
     }
 
-    /// As [`Rig::new`], with a seed for the fault injector.
+    /// Creates an arm as [`Rig::new`] does, with a seed for the fault injector.
     pub fn seeded(seed: u64) -> Rig<N> {
         Rig::set_up(description(N).home::<N>().unwrap(), PERIOD_NS, seed)
     }
 
-    /// As [`Rig::new`], from another pose and at another period.
+    /// Creates an arm as [`Rig::new`] does, in another pose and with another period.
     pub fn at(pose: Vector<N>, period_ns: u64) -> Rig<N> {
         Rig::set_up(pose, period_ns, 1)
     }
@@ -102,7 +102,7 @@ impl<const N: usize> Rig<N> {
         }
     }
 
-    /// An arm in gravity hold with the motors in torque mode.
+    /// Creates an arm in gravity hold with the motors in torque mode.
     pub fn holding() -> Rig<N> {
         let mut rig = Rig::new();
         rig.activate();

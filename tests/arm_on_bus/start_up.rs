@@ -1,4 +1,4 @@
-//! Start-up from power-on to normal operation, and rejection of arms that differ from the description.
+//! Tests of start-up from power-on to normal operation, and of the rejection of arms that differ from the description.
 
 use crate::rig::{self, MS, emulator, startup_config, try_start};
 use supple_bus::Bus;
@@ -14,7 +14,7 @@ fn home<const N: usize>() -> Vector<N> {
     rig::description(N).home::<N>().unwrap()
 }
 
-/// An arm in its home pose whose operator has pressed Shift-Idle.
+/// Creates an arm in its home pose whose operator has pressed Shift-Idle.
 fn idle_arm<const N: usize>(config: EmulatorConfig) -> rig::TestBus<N> {
     let mut emulator = emulator(config, home::<N>());
     emulator.press(ButtonPress::Idle);
@@ -34,7 +34,7 @@ fn starts<const N: usize>() {
     let emulator = &bus.inner().0;
     assert!(emulator.pucks().iter().all(|p| p.power() == Power::Ready));
     assert_eq!(emulator.safety().mode(), SafetyMode::Idle);
-    // The counts match the home pose, after the arm has sagged a little.
+    // The counts match the home pose after the arm has sagged slightly.
     let counts = ready.transmission.counts(&emulator.truth().position_rad);
     for (puck, counts) in emulator.pucks().iter().zip(counts.unwrap()) {
         assert!(
@@ -120,9 +120,9 @@ fn start_up_can_be_stopped_while_it_waits() {
     assert!(matches!(ended, Err(CanError::Stopped)), "{ended:?}");
 }
 
-/// A restarted host finds the arm awake, zeroed and active, and first switches it to idle.
+/// For a restarted host, the arm is awake, has its position reference and is active; the host first switches it to idle.
 #[test]
-fn a_second_start_accepts_an_arm_that_is_awake_and_zeroed() {
+fn a_second_start_accepts_an_arm_that_is_awake_and_has_its_position_reference() {
     let mut config = EmulatorConfig::wam(4);
     config.zeroed = true;
     let mut emulator = emulator(config, home::<4>());
@@ -141,7 +141,7 @@ fn a_second_start_accepts_an_arm_that_is_awake_and_zeroed() {
 }
 
 #[test]
-fn an_arm_without_positions_is_rejected() {
+fn an_arm_without_position_reference_is_rejected() {
     let startup_config = StartupConfig {
         zero_at_rad: None,
         ask: None,
@@ -231,7 +231,7 @@ fn an_arm_with_more_pucks_is_rejected() {
     assert!(error.contains("motor puck 5 answers"), "{error}");
 }
 
-/// Groups of the 2008 manual and unused slots are corrected, and the torque limit is set to the description's.
+/// Groups of the 2008 manual and unused slots are corrected, and the torque limit is set to the value of the description.
 #[test]
 fn settings_that_differ_are_corrected() {
     let mut config = EmulatorConfig::wam(7);

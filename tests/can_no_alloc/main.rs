@@ -1,5 +1,5 @@
-//! A `supple-can` cycle allocates nothing: with active motors, with every poll, with lost replies and frames,
-//! and during shutdown. The emulated arm in the same thread is not counted.
+//! Tests that a cycle of `supple-can` allocates no memory: with active motors, with every poll, with lost replies and frames,
+//! and during shutdown. Allocations of the emulated arm in the same thread are not counted.
 
 #[path = "../support/counting.rs"]
 mod counting;
@@ -9,7 +9,7 @@ mod link;
 use counting::{count_allocations, without_counting};
 use link::InProcessLink;
 use supple_bus::virtual_time::DirectBus;
-use supple_bus::{Bus, BusError, Event, FaultInjector, FaultKind, FaultRule, Traffic};
+use supple_bus::{Bus, BusError, Event, FaultInjector, FaultKind, FaultRule, TrafficDirection};
 use supple_can::{Cycle, StartupConfig, start_up};
 use supple_can_frame::CanFrame;
 use supple_core::Controller;
@@ -107,10 +107,11 @@ fn cycles_with_lost_frames_allocate_nothing() {
     run(&mut cycle, 50);
     press(&mut cycle, ButtonPress::Activate);
     run(&mut cycle, 50);
-    let lost = FaultRule::always(Traffic::Received, FaultKind::Loss).with_probability(0.01);
+    let lost =
+        FaultRule::always(TrafficDirection::Received, FaultKind::Loss).with_probability(0.01);
     cycle.drive_mut().bus_mut().add(lost);
     assert_eq!(count_allocations(|| run(&mut cycle, 100)), 0);
-    let silent = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss);
+    let silent = FaultRule::always(TrafficDirection::Sent, FaultKind::SilentLoss);
     cycle
         .drive_mut()
         .bus_mut()

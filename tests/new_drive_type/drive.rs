@@ -1,5 +1,5 @@
-//! moteus motors as drives: the torque is the question, its reply carries the state. Position and stiffness of the motor
-//! are off (position NaN, kp scale 0); its damping is on while the arm is held.
+//! Drives with moteus motors: the torque command is also the request for the motor state. Position control and stiffness of the
+//! motor are off (position NaN, kp scale 0); its damping is on while the arm is held.
 
 use core::f64::consts::TAU;
 use moteus_protocol::command::{PositionCommand, PositionFormat, StopCommand};
@@ -12,12 +12,12 @@ use supple_core::Vector;
 use supple_core::controller::Mode::GravityHold;
 use supple_drive::{
     Budget, BusPort, Command, Drive, DriveCounters, DriveState, Drives, LoopError, LossReason,
-    Lower, MotorFault, Reading, Received, Reserved, Rest,
+    LoweringMode, MotorFault, Reading, Received, ReservedTimes, TorqueOffBehaviour,
 };
 
 /// Damping of a motor at kd scale 1 \[N m s/rad\].
 pub const KD_NM_S_PER_RAD: f64 = 4.0;
-/// Silence after which a motor ends its torque \[s\].
+/// Watchdog time: time without a command after which a motor ends its torque \[s\].
 const WATCHDOG_S: f32 = 0.02;
 const MAX_TORQUE_NM: f32 = 100.0;
 /// Data length codes of 48 and 32 bytes.
@@ -25,7 +25,7 @@ const COMMAND_DLC: u8 = 14;
 const REPLY_DLC: u8 = 13;
 const REGISTER_MAP: u16 = 0x102;
 
-/// A torque at the output \[N m\], with a share of the motor's own damping.
+/// Encodes a torque at the output \[N m\], with a fraction of the motor's damping.
 fn torque_frame(frame: &mut CanFdFrame, torque_nm: f64, kd_scale: f64) {
     PositionCommand::new()
         .position(f32::NAN)
@@ -40,7 +40,7 @@ fn torque_frame(frame: &mut CanFdFrame, torque_nm: f64, kd_scale: f64) {
     QueryFormat::default().serialize(frame);
 }
 
-/// Frame to motor `index`, counted from 0, on the bus.
+/// Returns the bus frame to motor `index`, counted from 0.
 fn on_bus(index: usize, mut frame: CanFdFrame) -> CanFrame {
     frame.pad_to_dlc();
     let id = calculate_arbitration_id(0, index as i8 + 1, 0, true);
@@ -48,13 +48,13 @@ fn on_bus(index: usize, mut frame: CanFdFrame) -> CanFrame {
     CanFrame::fd(id, true, frame.payload()).expect("a length of FD")
 }
 
-/// Motor, counted from 0, that sent a frame to the host.
+/// Returns the motor, counted from 0, that sent a frame to the host.
 fn sender(frame: &CanFrame) -> Option<usize> {
     let raw = frame.id().as_standard()?;
     (raw & 0xff == 0).then(|| usize::from(raw >> 8 & 0x7f).checked_sub(1))?
 }
 
-/// Checks every motor before it gets torque.
+/// Checks every motor before any motor applies torque.
 pub fn start_up<const N: usize, B: Bus>(bus: &mut B) -> Result<(), String> {
     for index in 0..N {
         let mut frame = CanFdFrame::new();
@@ -82,7 +82,7 @@ pub fn start_up<const N: usize, B: Bus>(bus: &mut B) -> Result<(), String> {
     Ok(())
 }
 
-/// Motors of an arm, one per joint.
+/// The moteus motors of an arm, one per joint.
 pub struct Moteus<const N: usize, B> {
     port: BusPort<B>,
     replies: [Option<QueryResult>; N],
@@ -127,7 +127,7 @@ impl<const N: usize, B: Bus> Moteus<N, B> {
             Received::Frame(frame) => {
                 if let Some(index) = sender(&frame).filter(|index| *index < N) {
                     let result = QueryResult::parse_data(frame.payload());
-                    // The parser accepts anything: a reply without a position is none.
+                    // The parser accepts any bytes: a reply without a position is ignored.
                     if result.position.is_finite() {
                         self.modes[index] = result.mode;
                         self.faults[index] = result.fault;
@@ -145,12 +145,12 @@ impl<const N: usize, B: Bus> Drive<N> for Moteus<N, B> {
         self.port.bus().now_ns()
     }
 
-    fn rest(&self) -> Rest {
-        Rest::Falls
+    fn torque_off_behaviour(&self) -> TorqueOffBehaviour {
+        TorqueOffBehaviour::Falls
     }
 
-    fn reserved(&self) -> Reserved {
-        Reserved {
+    fn reserved(&self) -> ReservedTimes {
+        ReservedTimes {
             states_ns: self.budget().bus_ns(),
             torques_ns: 0,
         }
@@ -211,7 +211,7 @@ impl<const N: usize, B: Bus> Drive<N> for Moteus<N, B> {
             true => Drives::Active,
             false => Drives::Idle,
         };
-        // Numbers from 96 on report what limits the motor, and are no faults.
+        // Numbers from 96 on report a limit of the motor and are not faults.
         let fault = |index: usize| matches!(self.modes[index], Mode::Fault | Mode::Timeout);
         let faulty = (0..N).find(|index| self.enabled && fault(*index));
         DriveState {
@@ -247,7 +247,7 @@ impl<const N: usize, B: Bus> Drive<N> for Moteus<N, B> {
         Ok(())
     }
 
-    fn lower(&mut self, _: Lower, reason: LossReason) -> Result<(), LoopError> {
+    fn lower(&mut self, _: LoweringMode, reason: LossReason) -> Result<(), LoopError> {
         self.latched |= reason != LossReason::TorqueNotWanted;
         self.enabled = false;
         Ok(())

@@ -1,4 +1,4 @@
-//! Emulated moteus motors at the joints of a simulated arm: registers, modes, watchdog, one reply per command.
+//! Emulated moteus motors that move a simulated arm: registers, modes, watchdog, one reply per command.
 
 use core::f64::consts::TAU;
 use moteus_protocol::Mode;
@@ -25,13 +25,13 @@ struct Motor {
 }
 
 impl Motor {
-    /// The host writes modes as small integers and all else in single precision.
+    /// Writes a register. The host encodes modes as small integers and all other values in single precision.
     fn write(&mut self, now_ns: u64, register: u16, raw: [u8; 4]) {
         let number = f64::from(f32::from_le_bytes(raw));
         match register {
             0x000 => {
                 let mode = Mode::try_from(raw[0]).unwrap_or(Mode::Fault);
-                // Only a stop leaves a fault or a timeout.
+                // Only the stop mode clears a fault or a timeout.
                 if !matches!(self.mode, Mode::Fault | Mode::Timeout) || mode == Mode::Stopped {
                     self.mode = mode;
                 }
@@ -49,7 +49,7 @@ pub struct EmulatedMoteus {
     motors: [Motor; 4],
     now_ns: u64,
     next_tick_ns: u64,
-    /// Frames in order of sending: when they may start, and how long they last \[ns\].
+    /// Frames in order of sending, each with its earliest start time and its duration \[ns\].
     waiting: VecDeque<(u64, u64, Event)>,
     free_ns: u64,
     pub register_map: i16,
@@ -80,7 +80,7 @@ impl EmulatedMoteus {
         self.motors.iter().all(|motor| motor.mode == Mode::Stopped)
     }
 
-    /// A motor has a fault from now on.
+    /// Sets a fault of a motor.
     pub fn fail(&mut self, index: usize, fault: i8) {
         self.motors[index].mode = Mode::Fault;
         self.motors[index].fault = fault;
@@ -100,14 +100,14 @@ impl EmulatedMoteus {
                 _ => 0.0,
             }
         });
-        // A cradle carries the arm until its motors do.
+        // A cradle holds the arm until the motors are enabled.
         if self.motors.iter().any(|motor| motor.mode != Mode::Stopped) {
             self.plant.cycle(&torque_nm);
         }
         self.next_tick_ns += STEP_NS;
     }
 
-    /// Reaction to a command: the reply, with the registers that it asks for.
+    /// Executes a command; returns the reply with the requested registers.
     fn reaction(&mut self, frame: &CanFrame) -> Option<CanFrame> {
         let index = usize::from(frame.id().raw() as u8 & 0x7f).checked_sub(1)?;
         let angle_rev = self.plant.measurement().position_rad[index] / TAU;
@@ -147,7 +147,7 @@ impl EmulatedMoteus {
                     0x00f => f64::from(motor.fault),
                     _ => f64::from(self.register_map),
                 };
-                // One value per subframe; its register as a variable-length integer.
+                // Each subframe has one value, and its register as a variable-length integer.
                 reply.push(0x21 | head & 0x0c);
                 match register {
                     0..0x80 => reply.push(register as u8),

@@ -1,6 +1,5 @@
-//! A type of drives that the project does not ship, written against its public interfaces alone: mjbots moteus, through
-//! its published codec, on emulated motors. Codec glue, emulated motors, drive and tests are this folder; nothing else
-//! depends on them.
+//! Tests of a type of drives that is not part of the project and uses only its public interfaces: mjbots moteus with its published
+//! codec, on emulated motors. Use of the codec, emulated motors, drive and tests are in this folder.
 
 #[path = "../arm_on_bus/link.rs"]
 mod link;
@@ -80,14 +79,14 @@ fn a_lost_controller_ends_with_stopped_motors() {
     }
     stages.dedup();
     assert_eq!(stages.len(), 5, "{stages:?}");
-    assert!(matches!(stages[1], Stage::Holding(LossReason::Answer, _)));
-    assert!(matches!(stages[2], Stage::Stowing(LossReason::Answer, _)));
+    assert!(matches!(stages[1], Stage::Holding(LossReason::NoAnswer, _)));
+    assert!(matches!(stages[2], Stage::Stowing(LossReason::NoAnswer, _)));
     assert_eq!(stages[4], Stage::Resting);
     assert!(plant.drive().bus().0.all_stopped());
 }
 
 #[test]
-fn a_faulty_motor_is_named_with_its_code() {
+fn a_motor_fault_is_reported_with_its_code() {
     let mut plant = holding();
     plant.drive_mut().bus_mut().0.fail(2, 38);
     run(&mut plant, 2);

@@ -1,4 +1,4 @@
-//! `supple-can` with the emulated arm over a CAN interface of the kernel, at 1 kHz: wake-up, torque mode, a
+//! Tests of `supple-can` with the emulated arm on a CAN interface of the kernel, at 1 kHz: wake-up, torque mode, a
 //! thousand cycles, error frames, silent loss. `./ci.sh socketcan` runs it in a virtual machine that has such an
 //! interface and whose clock counts instructions, so that it runs at 1 kHz at any speed of the host; elsewhere
 //! `SUPPLE_CAN_INTERFACE` names an interface.
@@ -14,7 +14,7 @@ use realtime::{HOST_PRIORITY, realtime};
 
 use arm::Arm;
 use link::InProcessLink;
-use supple_bus::{BusFault, FaultInjector, FaultKind, FaultRule, SocketCan, Traffic};
+use supple_bus::{BusFault, FaultInjector, FaultKind, FaultRule, SocketCan, TrafficDirection};
 use supple_can::{Cycle, StartupConfig, start_up};
 use supple_core::Controller;
 use supple_core::controller::Request;
@@ -26,9 +26,9 @@ use supple_puck::status::MotorMode;
 
 const PERIOD_NS: u64 = 1_000_000;
 const ANSWER_NS: u64 = 50_000;
-/// Cycles within which every safe action is complete: 20 ms.
+/// Number of cycles within which every safe action is complete: 20 ms.
 const SAFE: usize = 20;
-/// Cycles for the operator's button to reach the motors and the host: 50 ms.
+/// Number of cycles until a button press has reached the motors and the host: 50 ms.
 const PRESSED: usize = 50;
 
 type Service = Cycle<4, FaultInjector<SocketCan>, InProcessLink<4>>;
@@ -39,7 +39,7 @@ fn run(cycle: &mut Service, cycles: usize) {
     }
 }
 
-/// Starts the arm up as the program does; the motors are idle.
+/// Runs start-up as the program does; the motors are then idle.
 fn in_service(interface: &str) -> Service {
     let description = Description::asset("wam4").unwrap();
     let config = description.config::<4>().unwrap();
@@ -130,7 +130,7 @@ fn an_arm_on_a_kernel_can_interface_runs_and_is_set_to_idle_after_every_loss() {
     arm.fault(BusFault::Restarted);
     activate(&mut cycle, &arm);
     let lost = cycle.counters().tx_lost;
-    let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss);
+    let rule = FaultRule::always(TrafficDirection::Sent, FaultKind::SilentLoss);
     cycle
         .drive_mut()
         .bus_mut()
@@ -138,14 +138,17 @@ fn an_arm_on_a_kernel_can_interface_runs_and_is_set_to_idle_after_every_loss() {
     run(&mut cycle, 1);
     assert_eq!(cycle.counters().tx_lost, lost + 1);
     run(&mut cycle, SAFE);
-    assert_eq!(cycle.guard().last_loss().unwrap().0, LossReason::Transmit);
+    assert_eq!(
+        cycle.guard().last_loss().unwrap().0,
+        LossReason::NotTransmitted
+    );
     assert!(arm.motors_in(MotorMode::Idle));
 
-    // A controller that stops answering.
+    // The controller stops answering.
     cycle.drive_mut().bus_mut().clear();
     activate(&mut cycle, &arm);
     cycle.link_mut().dead = true;
     run(&mut cycle, SAFE);
-    assert_eq!(cycle.guard().last_loss().unwrap().0, LossReason::Answer);
+    assert_eq!(cycle.guard().last_loss().unwrap().0, LossReason::NoAnswer);
     assert!(arm.motors_in(MotorMode::Idle));
 }

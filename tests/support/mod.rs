@@ -1,10 +1,11 @@
-//! Support for tests of the real programs.
+//! Support for tests that run the programs.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
 
-/// Folder of the programs; built once with the same selection as the test run, so that nothing is rebuilt.
+/// Returns the folder of the programs, which are built once with the same selection as the test run, so that cargo rebuilds
+/// nothing.
 /// `SUPPLE_PROGRAMS` names another folder, for example with the programs of an older version.
 pub fn programs() -> &'static Path {
     static PROGRAMS: OnceLock<PathBuf> = OnceLock::new();

@@ -1,8 +1,8 @@
-//! Settings of the property tests of all crates.
+//! Settings of the property-based tests of all crates.
 
 use proptest::test_runner::{Config, RngSeed, contextualize_config};
 
-/// `cases` random cases, the same in every run; a failing case is printed, not saved.
+/// Returns the settings for `cases` random cases, which are the same in every run; a failing case is printed and not saved.
 ///
 /// `PROPTEST_CASES` and `PROPTEST_RNG_SEED` override number and seed.
 pub fn config(cases: u32, seed: u64) -> Config {

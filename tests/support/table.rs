@@ -1,6 +1,6 @@
-//! Tables of `supple log export`.
+//! Reads tables of `supple log export`.
 
-/// Cells of a line of a table; a quoted cell may contain commas.
+/// Splits a line of a table into cells; a quoted cell may contain commas.
 pub fn cells(line: &str) -> Vec<&str> {
     let mut quoted = false;
     let at_comma = move |c: char| {

@@ -1,4 +1,4 @@
-//! `supple calibrate --plant`: from an arm to its model, on processes.
+//! Tests of `supple calibrate --plant`, which calibrates an arm through the processes.
 
 use crate::running::{json, run, stderr_of, supple, temporary_folder};
 use rustix::process::{Pid, Signal, kill_process};
@@ -26,16 +26,15 @@ fn progress(folder: &Path) -> Value {
     serde_json::from_str(&text.expect("written")).expect("JSON")
 }
 
-/// Names of the finished steps.
+/// Returns the names of the finished steps.
 fn steps(progress: &Value) -> Vec<String> {
     let steps = progress["finished"].as_array().expect("a list");
     let name = |step: &Value| step["step"].as_str().expect("a name").to_owned();
     steps.iter().map(name).collect()
 }
 
-/// The emulated arm is interrupted in the middle of a motion: every log is whole. It is resumed: nothing that is finished
-/// is repeated, and the controller is started anew with the model of the first pass, with which the arm moves at full
-/// amplitude.
+/// A calibration is interrupted during a motion: every log is complete. After --resume, finished steps are not repeated, and the
+/// controller is restarted with the model of the first pass, with which the arm moves at full amplitude.
 #[expect(
     clippy::disallowed_methods,
     reason = "the interrupt comes while the processes of a system run"
@@ -44,12 +43,15 @@ fn steps(progress: &Value) -> Vec<String> {
 fn an_emulated_arm_is_calibrated_across_an_interrupt() {
     let folder = temporary_folder();
     let mut interrupted = supple(folder.path(), &EMULATED).spawn().expect("it starts");
-    // A log gets its name once it is whole; the motion after this one is the first pass.
+    // A log gets its final name when it is complete; the motion after this log is the first pass.
     let logs = folder.path().join("out/calibrate/logs");
     let log = logs.join("breakaway-3-negative.mcap");
     while !log.exists() {
         let ended = interrupted.try_wait().expect("a child");
-        assert!(ended.is_none(), "it ended before the first pass: {ended:?}");
+        assert!(
+            ended.is_none(),
+            "the calibration ended before the first pass: {ended:?}"
+        );
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
     std::thread::sleep(std::time::Duration::from_millis(500));
@@ -61,7 +63,7 @@ fn an_emulated_arm_is_calibrated_across_an_interrupt() {
         "{}",
         stderr_of(&output)
     );
-    // It has its summary at the end, so that nothing has to be recovered.
+    // The log has its summary at the end, so that it does not have to be recovered.
     let info = run(
         folder.path(),
         &["log", "info", "out/calibrate/logs/first-pass.mcap"],
@@ -101,14 +103,14 @@ fn an_emulated_arm_is_calibrated_across_an_interrupt() {
     assert!(svg.expect("drawn").contains("from the side"));
 }
 
-/// A motor that turns the other way is named before anything moves far, with the remedy.
+/// The error names a motor with reversed direction, and a remedy, before the arm moves far.
 #[test]
-fn a_reversed_motor_is_named() {
+fn the_error_of_a_reversed_motor_names_the_joint() {
     let folder = temporary_folder();
     let wrong = ["--inject", "torque-sign:joint=0", "--warm-up", "0"];
     let arguments = [&EMULATED[..4], &["--candidates", "60", "--yes"], &wrong].concat();
     let output = run(folder.path(), &arguments);
-    // The controller notices before the ramp has ended.
+    // The controller detects the fault before the ramp has ended.
     assert_eq!(output.status.code(), Some(5), "{}", stderr_of(&output));
     let text = stderr_of(&output);
     for part in [
@@ -120,7 +122,7 @@ fn a_reversed_motor_is_named() {
     }
 }
 
-/// Without a terminal and without --yes nothing sweeps the space; the drawing is there to be looked at.
+/// Without a terminal and without --yes, the arm does not move; the drawing of the swept space exists.
 #[test]
 fn the_swept_space_must_be_confirmed() {
     let folder = temporary_folder();

@@ -1,4 +1,4 @@
-//! A subset of `supple drill`: test cases in virtual time, which are reproducible, and one process loss in wall-clock
+//! Tests of `supple drill` with a subset of its cases: test cases in virtual time, which are reproducible, and one process loss in wall-clock
 //! time without timing checks.
 
 use crate::running::{run, stderr_of, temporary_folder};
@@ -51,7 +51,7 @@ fn faults_collisions_and_invalid_requests_give_the_expected_results() {
     arguments.push("--virtual-time");
     let (rows, stderr, code) = drill(folder.path(), &arguments);
     assert_eq!(rows.len(), wanted.len(), "{stderr}");
-    // Standard error is a pipe: each case is announced on a line of its own.
+    // Standard error is a pipe: each case is reported on a separate line.
     for number in 1..=wanted.len() {
         let line = format!("{number}/{}: ", wanted.len());
         assert!(
@@ -70,8 +70,8 @@ fn faults_collisions_and_invalid_requests_give_the_expected_results() {
     assert!(page.contains("| sim/move/encoder-sign:joint=1 |"), "{page}");
 }
 
-/// Random cases are the same in each run, however the processors share them. None of these gives the arm more than 3 J, nor faults
-/// without a cause. An encoder that stuck under a stiff law once drove it to 33 J.
+/// Random cases are the same in each run, for any distribution to the processors. None of these cases gives the arm more than 3 J or
+/// causes a false fault. A stuck encoder under a stiff law once gave it 33 J.
 #[test]
 fn random_faults_are_reproducible_and_bounded() {
     let folder = temporary_folder();
@@ -90,7 +90,7 @@ fn random_faults_are_reproducible_and_bounded() {
         "{stderr}"
     );
     for row in &rows {
-        // A bump gives the arm its energy itself.
+        // A bump transfers its energy to the arm.
         let struck = row["faults"].to_string().contains("bump");
         let peak_j = row["peak_j"].as_f64().expect("a number");
         assert!(struck || peak_j < 3.0, "{row:#}");
@@ -122,7 +122,7 @@ fn a_test_case_in_virtual_time_is_reproducible() {
 }
 
 #[test]
-fn an_unknown_test_case_is_named() {
+fn the_error_of_an_unknown_test_case_contains_its_name() {
     let folder = temporary_folder();
     let output = run(folder.path(), &["drill", "--only", "sim/dance"]);
     assert_eq!(output.status.code(), Some(2));

@@ -1,5 +1,5 @@
-//! Shutdown on a full disk, a terminal interrupt and a fault: the arm keeps running as long as possible, the log is
-//! preserved, and the exit code names the cause.
+//! Tests of the end of a run by a full disk, a terminal interrupt and a fault: the arm keeps running as long as possible, the log
+//! is preserved, and the exit code shows the cause.
 
 use crate::running::{Up, json, stderr_of, supple, temporary_folder};
 use crate::support::programs;
@@ -11,7 +11,7 @@ use supple_model::Description;
 
 /// A limit on the file size of `supple up` simulates a full disk for this process only.
 #[test]
-fn a_full_disk_ends_the_log_and_not_the_arm() {
+fn a_full_disk_ends_the_log_but_not_the_run() {
     let mut up = Up::start(&["--json", "--plant", "sim", "--log", "run.mcap"]);
     up.wait_until("control", |status| status["cycle"].as_u64() > Some(1000));
     let part = up.folder.path().join("run.mcap.part");
@@ -39,7 +39,7 @@ fn a_full_disk_ends_the_log_and_not_the_arm() {
         }
     }
     assert_eq!(stderr_of(&output).matches("the log ends here").count(), 1);
-    // On a slow machine a fault may occur in addition.
+    // On a slow machine, a fault may also occur.
     let faults = summary["faults"].as_array().expect("a list").len();
     let code = if faults == 0 { 6 } else { 5 };
     assert_eq!(output.status.code(), Some(code), "{}", stderr_of(&output));
@@ -78,7 +78,7 @@ fn an_interrupt_keeps_the_events_of_the_arm() {
     );
 }
 
-/// The 4-joint arm with a limit that the first millimetres of error exceed.
+/// Creates the 4-joint arm with a limit that the first millimetres of error exceed.
 fn timid_arm(folder: &Path) {
     let arm = Description::asset("wam4").expect("built in");
     let limit = |line: &str| {
@@ -109,7 +109,7 @@ fn a_run_that_ends_with_a_fault_is_code_5_with_its_summary() {
     assert!(folder.path().join("run.mcap").exists());
 }
 
-/// Where the emulated arm does not start, its own reason is not followed by what its pendant lacks.
+/// If the emulated arm does not start, only its own error is reported, and no error of its pendant.
 #[test]
 fn an_emulated_arm_that_does_not_start_is_the_only_failure() {
     let folder = temporary_folder();
@@ -128,7 +128,7 @@ fn the_processes_use_the_documented_exit_codes() {
     let folder = temporary_folder();
     let fifo = folder.path().join("fifo");
     let made = Command::new("mkfifo").arg(&fifo).status();
-    assert!(made.expect("mkfifo is there").success());
+    assert!(made.expect("mkfifo exists").success());
     let arm = Description::asset("wam4").expect("built in");
     let urdf = arm.urdf().replace("</robot>", "<gazebo/></robot>");
     fs::write(folder.path().join("arm.toml"), arm.toml()).expect("written");

@@ -1,13 +1,14 @@
-//! Arms without brakes as processes: their motors are enabled, track, and are laid down before they are disabled.
+//! Tests of arms without brakes as processes: the motors are enabled, the arm tracks, and is laid down before the motors are
+//! disabled.
 
 use crate::running::{Up, json, run, stderr_of, temporary_folder};
 use rustix::process::{Signal, kill_process};
 use std::path::Path;
 
-/// Cycles of the longest laying down.
+/// Maximum number of cycles for laying the arm down.
 const LAID_DOWN_CYCLES: u64 = 6000;
 
-/// Numbers of a column of a trace.
+/// Reads the numbers of a column of a trace.
 fn column(trace: &Path, name: &str) -> Vec<f64> {
     let text = std::fs::read_to_string(trace).expect("a trace");
     let mut lines = text.lines();
@@ -17,7 +18,7 @@ fn column(trace: &Path, name: &str) -> Vec<f64> {
     values.collect()
 }
 
-/// The arm was laid down: the reports list it in order, and it lies when its motors are disabled.
+/// Asserts that the arm was laid down: the reports list the stages in order, and the arm lies when its motors are disabled.
 fn assert_laid_down(stderr: &str, trace: &Path) {
     let mut from = 0;
     for stage in [
@@ -35,7 +36,7 @@ fn assert_laid_down(stderr: &str, trace: &Path) {
     assert_eq!(enabled.last(), Some(&0.0));
     let speed = column(trace, "joint_speed_rad_per_s");
     let fastest = |rows: &[f64]| rows.iter().copied().fold(0.0, f64::max);
-    // No joint moves fast at any time, and when the motors are disabled none moves.
+    // No joint moves fast at any time, and no joint moves when the motors are disabled.
     assert!(fastest(&speed) < 0.8, "{} rad/s", fastest(&speed));
     let disabled = enabled.iter().rposition(|motors| *motors > 0.0);
     let at_rest = &speed[disabled.expect("enabled")..];
@@ -114,7 +115,7 @@ fn a_signal_in_motion_lays_the_arm_down_before_its_motors_are_disabled() {
     assert_laid_down(&stderr, &up.folder.path().join("trace.csv"));
 }
 
-/// Gravity hold does not end the laying down, and says so; afterwards the arm can be enabled again.
+/// Gravity hold does not end the laying down, and its error explains this; afterwards the arm can be enabled again.
 #[test]
 fn gravity_hold_is_refused_while_the_arm_is_laid_down() {
     let how = [

@@ -1,5 +1,5 @@
-//! An emulated arm whose processes share a standard error that nobody reads, full or closed: `supple up`, `supple-can`,
-//! `supple-emu` and `supple-rt` all write to it. The arm tracks, and idle acts within 20 cycles of being asked.
+//! Tests of an emulated arm whose processes share a standard error that is not read, full or closed: `supple up`, `supple-can`,
+//! `supple-emu` and `supple-rt` all write to it. The arm tracks, and idle acts within 20 cycles of the request.
 
 use crate::running::{PREFIX, supple, temporary_folder};
 use core::time::Duration;
@@ -15,20 +15,20 @@ use tempfile::TempDir;
 
 /// Maximum number of cycles until idle is accepted, at 1 kHz.
 const IDLE_WITHIN_CYCLES: u64 = 20;
-/// A blocked process fails every attempt, a busy machine does not.
+/// Number of attempts: a blocked process fails all of them, a busy machine does not.
 const ATTEMPTS: u32 = 5;
 const TIMEOUT: Duration = Duration::from_secs(30);
 
-/// A system in the background, without a reader of its standard error.
-struct Unread {
+/// A system in the background whose standard error is not read.
+struct UnreadSystem {
     child: Child,
     domain: Domain,
     reader: TelemetryReader,
     _folder: TempDir,
 }
 
-impl Unread {
-    fn start(stderr: &PipeWriter) -> Unread {
+impl UnreadSystem {
+    fn start(stderr: &PipeWriter) -> UnreadSystem {
         let folder = temporary_folder();
         let domain = Domain::in_folder(&folder.path().join("supple"), PREFIX).expect("a domain");
         let reader = TelemetryReader::new(&domain).expect("a reader");
@@ -38,7 +38,7 @@ impl Unread {
             .stderr(stderr.try_clone().expect("a copy"))
             .process_group(0)
             .spawn();
-        Unread {
+        UnreadSystem {
             child: child.expect("it starts"),
             domain,
             reader,
@@ -46,7 +46,7 @@ impl Unread {
         }
     }
 
-    /// The next telemetry for which the condition holds; `None` if the system ends or is in a fault before.
+    /// Waits for telemetry for which the condition holds; `None` if the system ends or is in a fault before.
     fn until(&mut self, condition: impl Fn(&Telemetry) -> bool) -> Option<Telemetry> {
         for _ in 0..60_000 {
             let telemetry = self.reader.wait(TIMEOUT).expect("read")?;
@@ -60,7 +60,7 @@ impl Unread {
         None
     }
 
-    /// The newest cycle.
+    /// Returns the newest cycle.
     fn now(&mut self) -> Option<u64> {
         let mut cycle = self.reader.wait(TIMEOUT).expect("read")?.state.cycle;
         while let Some(telemetry) = self.reader.receive().expect("read") {
@@ -69,7 +69,7 @@ impl Unread {
         Some(cycle)
     }
 
-    /// Cycles from a request of idle to the one in which it acts; the drives become idle after it.
+    /// Requests idle; returns the number of cycles until it acts. The drives then become idle.
     fn idle(&mut self) -> Option<u64> {
         let asked = self.now()?;
         let answer = request_idle(&self.domain, TIMEOUT)
@@ -90,7 +90,7 @@ impl Unread {
 fn check(stderr: &PipeWriter) {
     let mut quickest = u64::MAX;
     for _ in 0..ATTEMPTS {
-        let mut up = Unread::start(stderr);
+        let mut up = UnreadSystem::start(stderr);
         let tracks = |telemetry: &Telemetry| {
             telemetry.record().mode() == Some(Mode::Track)
                 && telemetry.state.drives() == Drives::Active
@@ -98,7 +98,7 @@ fn check(stderr: &PipeWriter) {
         let acted = up.until(tracks).and_then(|_| up.idle());
         if let Some(cycles) = acted {
             quickest = quickest.min(cycles);
-            // The controller answers the operator again, too.
+            // The controller also answers the operator again.
             let mut operator = OperatorClient::new(&up.domain).expect("an operator");
             let sent = operator.send::<4>(&Request::GravityHold, None);
             assert!(sent.expect("sent").is_some());
@@ -113,10 +113,10 @@ fn check(stderr: &PipeWriter) {
             return;
         }
     }
-    panic!("idle acts after {quickest} cycles");
+    panic!("idle acted after {quickest} cycles, which is too late");
 }
 
-/// A full pipe.
+/// Creates a full pipe.
 fn full() -> (PipeReader, PipeWriter) {
     let (reader, mut writer) = pipe().expect("a pipe");
     let flags = fcntl_getfl(&writer).expect("flags");

@@ -1,4 +1,4 @@
-//! Learning in a complete system: on request, shown, logged, saved, and the same in every run of virtual time.
+//! Tests of learning in a complete system: it is switched, shown, logged and saved, and equal in every run in virtual time.
 
 use crate::running::{Up, json, run, stderr_of, temporary_folder};
 use std::path::Path;
@@ -21,9 +21,9 @@ fn learned_requests(log: &Path) -> Vec<(u64, Request<4>)> {
     requests.collect()
 }
 
-/// In virtual time two runs learn the same in the same cycles; a replay gives the same bits.
+/// In virtual time, two runs learn the same terms in the same cycles, and a replay is bit-identical.
 #[test]
-fn same_log_in_every_run_of_virtual_time() {
+fn runs_in_virtual_time_give_equal_logs_with_learning() {
     let folder = temporary_folder();
     let run_once = |name: &str| {
         let arguments = [
@@ -48,7 +48,7 @@ fn same_log_in_every_run_of_virtual_time() {
     assert_eq!(requests, learned_requests(&second));
     let again = replay(&first).expect("replayed");
     assert_eq!(again.different_steps, 0, "{again}");
-    // Without --learn nothing is learned.
+    // Without --learn, no terms are learned.
     let output = run(
         folder.path(),
         &[

@@ -1,4 +1,4 @@
-//! Complete systems with the real programs: `supple up` with its processes, and the operator commands.
+//! Tests of complete systems with the programs: `supple up` with its processes, and the operator commands.
 
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,4 +1,4 @@
-//! `supple motors` against emulated Damiao motors.
+//! Tests of `supple motors` with emulated Damiao motors.
 
 use crate::running::{PREFIX, json, run, stderr_of, temporary_folder};
 use crate::support::programs;
@@ -7,7 +7,7 @@ use std::process::{Child, Command, Output, Stdio};
 use supple_realtime::pause;
 use tempfile::TempDir;
 
-/// An emulated arm in a folder of its own.
+/// An emulated arm in a temporary folder.
 struct Emulated {
     folder: TempDir,
     child: Child,
@@ -47,7 +47,7 @@ impl Emulated {
 
 impl Drop for Emulated {
     fn drop(&mut self) {
-        // Asked to end, it would wait for a host that disables its motors.
+        // After SIGTERM, the emulator would wait for a host that disables its motors.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -110,7 +110,7 @@ fn a_register_is_set_only_when_asked_and_never_a_range() {
 }
 
 #[test]
-fn motors_that_do_not_fit_are_named_with_a_remedy() {
+fn motors_that_do_not_match_are_reported_with_a_remedy() {
     let arm = Emulated::start(&[
         "--arm",
         "yam",
@@ -144,7 +144,7 @@ fn motors_that_do_not_fit_are_named_with_a_remedy() {
 }
 
 #[test]
-fn registers_are_not_touched_while_a_motor_is_enabled() {
+fn registers_are_neither_read_nor_written_while_a_motor_is_enabled() {
     let arm = Emulated::start(&["--arm", "yam", "--misbehave", "enabled:motor=4"]);
     let output = arm.motors(&["--arm", "yam", "--motor", "1", "--set", "TIMEOUT=400"]);
     assert_eq!(output.status.code(), Some(10));
@@ -156,7 +156,7 @@ fn registers_are_not_touched_while_a_motor_is_enabled() {
 }
 
 #[test]
-fn an_arm_without_a_bus_and_a_bus_without_an_arm() {
+fn an_arm_without_a_bus_and_a_bus_without_an_arm_are_errors() {
     let folder = temporary_folder();
     let output = run(folder.path(), &["motors", "--arm", "wam4"]);
     assert_eq!(output.status.code(), Some(10));

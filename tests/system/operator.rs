@@ -1,5 +1,5 @@
-//! Complete systems with all client resources exhausted: the operator is still served, and a second operator gets an
-//! orderly error.
+//! Tests of complete systems with all client resources exhausted: the controller still serves the operator, and a second operator
+//! gets an error with a remedy.
 
 use crate::running::{PREFIX, Up, json, stderr_of, supple, temporary_folder};
 use crate::support::programs;
@@ -15,7 +15,7 @@ use supple_realtime::pause;
 
 /// Maximum number of cycles until idle is accepted, at 1 kHz.
 const IDLE_WITHIN_CYCLES: u64 = 20;
-/// A real blockage shows in every attempt, a busy machine does not: take the best of several.
+/// Number of attempts, of which the best counts: a real blockage affects all attempts, a busy machine does not.
 const ATTEMPTS: u32 = 5;
 const TIMEOUT: Duration = Duration::from_secs(30);
 
@@ -44,10 +44,10 @@ fn wait_for_mode(reader: &mut TelemetryReader, mode: Mode) -> u64 {
             telemetry.record().fault_text
         );
     }
-    panic!("mode {} did not come", mode.name());
+    panic!("the controller did not enter mode {}", mode.name());
 }
 
-/// The newest cycle.
+/// Returns the newest cycle.
 fn now(reader: &mut TelemetryReader) -> u64 {
     let mut cycle = reader
         .wait(TIMEOUT)
@@ -64,7 +64,7 @@ fn now(reader: &mut TelemetryReader) -> u64 {
 #[test]
 fn idle_is_accepted_while_all_slots_the_queue_and_the_lock_are_taken() {
     let (up, domain, mut reader) = tracking();
-    // Hung clients that occupy all slots, and requests that fill the queue.
+    // Hung clients occupy all slots, and requests fill the queue.
     let readers: Vec<_> = (0..20)
         .map_while(|_| TelemetryReader::new(&domain).ok())
         .collect();
@@ -85,7 +85,7 @@ fn idle_is_accepted_while_all_slots_the_queue_and_the_lock_are_taken() {
         "{}",
         stderr_of(&refused)
     );
-    // A process that was stopped while it held the membership lock.
+    // A process was stopped while it held the membership lock.
     let lock = domain.folder().join(format!("{PREFIX}.membership.lock"));
     let lock = std::fs::File::open(lock).expect("a lock");
     flock(&lock, FlockOperation::LockExclusive).expect("locked");
@@ -104,7 +104,7 @@ fn idle_is_accepted_while_all_slots_the_queue_and_the_lock_are_taken() {
         wait_for_mode(&mut reader, Mode::Idle);
         busy.send::<4>(&Request::GravityHold, None)
             .expect("sent")
-            .expect("there is room");
+            .expect("the queue has space");
         wait_for_mode(&mut reader, Mode::GravityHold);
     }
     assert!(quickest <= IDLE_WITHIN_CYCLES, "{quickest} cycles");
@@ -121,7 +121,7 @@ fn idle_is_accepted_while_all_slots_the_queue_and_the_lock_are_taken() {
 #[test]
 fn a_system_in_a_fault_is_code_5() {
     let (up, _domain, mut reader) = tracking();
-    // No arm states arrive: the controller faults.
+    // No arm states arrive, so that the controller enters a fault.
     let sim = up.child("supple-sim");
     kill_process(sim, Signal::STOP).expect("it runs");
     wait_for_mode(&mut reader, Mode::Fault);
@@ -143,9 +143,9 @@ fn a_system_in_a_fault_is_code_5() {
     assert_eq!(output.status.code(), Some(5), "{}", stderr_of(&output));
 }
 
-/// Something has put another file in the place of the socket: idle is requested as any other mode.
+/// Another program has replaced the file of the socket: idle is requested as any other mode.
 #[test]
-fn idle_is_heard_without_its_socket() {
+fn idle_is_accepted_without_its_socket() {
     let (up, domain, mut reader) = tracking();
     let socket = idle_socket(&domain);
     std::fs::remove_file(&socket).expect("removed");
@@ -153,15 +153,15 @@ fn idle_is_heard_without_its_socket() {
     let output = up.run(&["mode", "idle"]);
     let words = stderr_of(&output);
     assert!(output.status.success(), "{words}");
-    for part in ["warning", ".idle.socket", "nobody answers"] {
+    for part in ["warning", ".idle.socket", "does not answer"] {
         assert!(words.contains(part), "{part}: {words}");
     }
     wait_for_mode(&mut reader, Mode::Idle);
 }
 
-/// The arm of the running system is the default; another one is refused by its name.
+/// The arm of the running system is the default; another arm is refused.
 #[test]
-fn a_command_knows_the_arm_of_the_running_system() {
+fn commands_use_the_arm_of_the_running_system() {
     let up = Up::tracking(&["--plant", "sim", "--no-log", "--arm", "wam3"]);
     let tracked = up.run(&["track", "arc"]);
     assert!(tracked.status.success(), "{}", stderr_of(&tracked));
@@ -175,9 +175,9 @@ fn a_command_knows_the_arm_of_the_running_system() {
     }
 }
 
-/// A program that cleans /tmp has removed the files through which the system is stopped: they are created anew.
+/// A program that cleans /tmp has removed the files with which the system is stopped: they are created again.
 #[test]
-fn the_files_of_a_running_system_are_created_anew() {
+fn removed_files_of_a_running_system_are_created_again() {
     let (mut up, domain, _) = tracking();
     let pidfile = domain.folder().join(format!("{PREFIX}.pid"));
     let files = [idle_socket(&domain), pidfile];
@@ -196,12 +196,12 @@ fn the_files_of_a_running_system_are_created_anew() {
     assert!(stopped.status.success(), "{}", stderr_of(&stopped));
     let output = up.ended();
     assert!(output.status.success(), "{}", stderr_of(&output));
-    assert!(files.iter().all(|file| !file.exists()), "nothing is left");
+    assert!(files.iter().all(|file| !file.exists()), "no file is left");
 }
 
-/// A controller that is stopped hears nobody: the message says what the arm does, and what to do.
+/// A stopped controller does not answer: the message contains the reaction of the arm and a remedy.
 #[test]
-fn idle_of_a_stopped_controller_says_what_the_drives_do() {
+fn the_error_of_an_unanswered_idle_request_describes_the_reaction_of_the_drives() {
     let (up, ..) = tracking();
     let controller = up.child("supple-rt");
     kill_process(controller, Signal::STOP).expect("it runs");

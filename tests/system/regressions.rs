@@ -7,11 +7,11 @@ use std::process::Output;
 
 /// Maximum tip speed in normal operation, while descending on braking motors, or while coming to rest \[m/s\].
 const TIP_M_PER_S: f64 = 1.0;
-/// The same for an arm whose drives are re-enabled while it holds still.
+/// Maximum tip speed of an arm whose drives are re-enabled while it stands still \[m/s\].
 const ACTIVATED_M_PER_S: f64 = 0.5;
-/// Observed tip force above which the arm touches an obstacle \[N\].
+/// Observed tip force above which the arm counts as touching an obstacle \[N\].
 const TOUCHED_N: f64 = 15.0;
-/// Cycles of 1 ms in which a collision stops a move.
+/// Maximum number of cycles of 1 ms until a collision stops a move.
 const STOPS_WITHIN: usize = 20;
 
 /// Columns of the steps of a log, by the names of `supple log export`.
@@ -36,7 +36,7 @@ impl Steps {
         Steps(rows.collect())
     }
 
-    /// Length of the vector in the first three columns, per cycle.
+    /// Returns the length of the vector in the first three columns, per cycle.
     fn lengths(&self) -> impl Iterator<Item = f64> {
         self.0
             .iter()
@@ -103,7 +103,7 @@ fn reenabled_drives_do_not_jump() {
     assert!(speed < ACTIVATED_M_PER_S, "{speed} m/s");
 }
 
-/// The fault ends the run, and with it the log; what the block feels afterwards is measured by `supple drill`.
+/// The fault ends the run and its log; `supple drill` measures the later force on the block.
 #[test]
 fn a_block_in_the_way_stops_a_move() {
     let block = ["--plant", "sim", "--block-m", "0.1", "--for", "9"];
@@ -113,7 +113,7 @@ fn a_block_in_the_way_stops_a_move() {
     let [x, y, z] = columns.each_ref().map(String::as_str);
     let steps = Steps::of(up, &[x, y, z, "fault"]);
     let contact = steps.lengths().position(|force| force > TOUCHED_N);
-    let contact = contact.expect("the block is in the way");
+    let contact = contact.expect("the arm touches the block");
     let fault = steps.0.iter().position(|row| row[3] > 0.0);
     let fault = fault.expect("no fault");
     assert!(

@@ -9,9 +9,9 @@ use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use tempfile::TempDir;
 
-/// Starts of a system that is to track, of which one must succeed.
+/// Number of attempts to start a system that tracks, of which one must succeed.
 const STARTS: u32 = 4;
-/// Cycles after which the drives of a system that starts have been activated.
+/// Number of cycles after which the drives of a starting system have been activated.
 const SETTLED_CYCLES: u64 = 2000;
 
 /// Every test has its own folder for sockets and shared memory, so all systems can use the same prefix.
@@ -68,8 +68,8 @@ impl Up {
         Up { folder, child }
     }
 
-    /// As [`Up::start`], and waits until it tracks. A busy machine may stall a process, after which the drives become idle
-    /// or a fault is latched: then it is started again, a few times.
+    /// Starts a system as [`Up::start`] does, and waits until it tracks. If a busy machine stalls a process, so that the drives become
+    /// idle or a fault latches, starts the system again, at most [`STARTS`] times.
     pub fn tracking(arguments: &[&str]) -> Up {
         let mut last = String::new();
         for _ in 0..STARTS {
@@ -84,7 +84,7 @@ impl Up {
             }
             last = format!("{status}: {}", stderr_of(&up.end()));
         }
-        panic!("it did not track: {last}");
+        panic!("the system did not track: {last}");
     }
 
     pub fn run(&self, arguments: &[&str]) -> Output {
@@ -114,7 +114,7 @@ impl Up {
         let mut last = String::new();
         for _ in 0..400 {
             let output = self.run(&["status", "--json"]);
-            // With a latched fault the status is printed, too, with code 5.
+            // With a latched fault, the status is also printed, with exit code 5.
             if matches!(output.status.code(), Some(0 | 5)) {
                 let status = json(&output);
                 if condition(&status) {

@@ -1,5 +1,5 @@
-//! Idle that is accepted while `supple up` starts a system has the last word: the drives are not activated, the arm does
-//! not move, and the system goes on running.
+//! Tests that idle, accepted while `supple up` starts a system, overrides the start-up: the drives are not activated, the arm does
+//! not move, and the system keeps running.
 
 use crate::running::{PREFIX, Up, stderr_of, supple, temporary_folder};
 use core::time::Duration;
@@ -9,9 +9,9 @@ use supple_ipc::{Domain, IdleAnswer, TelemetryReader, request_idle};
 use supple_realtime::pause;
 
 const TIMEOUT: Duration = Duration::from_secs(30);
-/// Cycles within which the drives are idle after idle was accepted.
+/// Maximum number of cycles until the drives are idle after idle was accepted.
 const LOWERED_CYCLES: u64 = 120;
-/// Cycles that are watched: start-up takes about 400.
+/// Number of observed cycles; start-up takes about 400.
 const WATCHED_CYCLES: u64 = 1000;
 const WORDS: [&str; 3] = ["start-up ends here", "idle", "`supple mode gravity-hold`"];
 
@@ -21,7 +21,7 @@ struct Starting {
     reader: TelemetryReader,
 }
 
-/// Asks for idle until somebody hears it.
+/// Requests idle until the controller answers.
 fn idle(domain: &Domain) -> IdleAnswer {
     for _ in 0..30_000 {
         let answer = request_idle(domain, TIMEOUT).expect("requested");
@@ -50,14 +50,14 @@ impl Starting {
                 return;
             }
         }
-        panic!("mode {} did not come", mode.name());
+        panic!("the controller did not enter mode {}", mode.name());
     }
 
-    /// Controller and drives stay idle; then the operator goes on.
+    /// Asserts that controller and drives stay idle; then the operator continues.
     fn assert_stays_idle(&mut self, since: u64) {
         loop {
             let telemetry = self.reader.wait(TIMEOUT).expect("read");
-            let telemetry = telemetry.expect("the system goes on running");
+            let telemetry = telemetry.expect("the system keeps running");
             let Some(after) = telemetry.state.cycle.checked_sub(since) else {
                 continue;
             };
@@ -84,7 +84,7 @@ impl Starting {
     }
 }
 
-/// As early as there is a controller; the emulated arm has not sent a state yet.
+/// Idle is requested as soon as the controller runs; the emulated arm has not sent a state yet.
 #[test]
 fn idle_as_early_as_possible_is_not_overridden() {
     for plant in ["sim", "emu"] {
@@ -95,7 +95,7 @@ fn idle_as_early_as_possible_is_not_overridden() {
     }
 }
 
-/// The pendant is not pressed, and a run of limited time goes on, too.
+/// The pendant is not pressed, and a run of limited duration also continues.
 #[test]
 fn idle_in_gravity_hold_is_not_overridden() {
     for (plant, rest) in [("sim", &[][..]), ("emu", &["--for", "60"][..])] {
@@ -113,7 +113,7 @@ fn idle_in_gravity_hold_is_not_overridden() {
     }
 }
 
-/// A calibration that has just started its controller does not move the arm either: it ends.
+/// A calibration that has just started its controller does not move the arm: it ends.
 #[test]
 fn idle_ends_a_calibration_that_starts() {
     let folder = temporary_folder();

@@ -1,34 +1,34 @@
-//! A hand guides the simulated arm of a running system; what it showed is recorded, repeated, and refused where it is not
-//! possible. The motions are on the system's clock, which pauses when the host stalls.
+//! Tests of teaching: a simulated hand guides the arm of a running system; the motion is recorded, repeated, and refused if it is
+//! not feasible. The motions use the system's clock, which pauses when the host stalls.
 
 use crate::running::{Up, json, stderr_of};
 use serde_json::Value;
 
-/// A hand that guides the tip for six seconds whenever the arm floats.
+/// Plant options of a hand that guides the tip for six seconds when the arm floats.
 const HAND: &str = "[hand]
 path = [[0.5, 0.0, 0.0, 0.0], [2.0, 0.0, 0.1, 0.05], [4.0, -0.06, 0.0, 0.1], [6.0, 0.0, 0.0, 0.0]]
 ";
-/// Largest distance of the repetition from what was shown, root mean square \[m\]. Expected before the first run: 5 mm;
-/// reached at 5 N/m: 6.6 mm, by dry friction at rests and reversals.
-const LARGEST_RMS_M: f64 = 10e-3;
+/// Maximum root mean square distance of the repetition from the taught motion \[m\]. Expected before the first run: 5 mm;
+/// measured at 5 N/m: 6.6 mm, due to dry friction at rests and reversals.
+const MAX_RMS_M: f64 = 10e-3;
 
-/// Attempts, of which one must not be held up: the drives of a stalled system become idle and stay so.
+/// Number of attempts, of which one must run without a stall: the drives of a stalled system become idle and stay idle.
 const ATTEMPTS: usize = 4;
 
 #[test]
-fn a_motion_shown_by_hand_is_recorded_and_repeated() {
+fn a_motion_taught_by_hand_is_recorded_and_repeated() {
     let folder = crate::running::temporary_folder();
     let options = folder.path().join("hand.toml");
     std::fs::write(&options, HAND).expect("written");
     let options = options.to_str().expect("a name");
     let attempt = || {
         let up = Up::tracking(&["--plant", "sim", "--no-log", "--plant-options", options]);
-        shown_and_repeated(&up)
+        teach_and_play(&up)
     };
     assert!((0..ATTEMPTS).any(|_| attempt().is_some()), "stalled");
 }
 
-/// The answer of a command; `None` if the host stalled, so that the drives are idle.
+/// Runs a command and returns its answer; `None` if the host stalled, so that the drives are idle.
 fn answer(up: &Up, arguments: &[&str]) -> Option<Value> {
     let output = up.run(arguments);
     let status = json(&up.run(&["status", "--json"]));
@@ -39,7 +39,7 @@ fn answer(up: &Up, arguments: &[&str]) -> Option<Value> {
     Some(json(&output))
 }
 
-fn shown_and_repeated(up: &Up) -> Option<()> {
+fn teach_and_play(up: &Up) -> Option<()> {
     let taught = answer(up, &["teach", "shown.csv", "--for", "7", "--json"])?;
     let shown_s = taught["duration_s"].as_f64().expect("a duration");
     assert!((4.0..7.0).contains(&shown_s), "{taught}");
@@ -49,13 +49,13 @@ fn shown_and_repeated(up: &Up) -> Option<()> {
 
     let played = answer(up, &["play", "shown.csv", "--stiffness", "5", "--json"])?;
     let rms_m = played["rms_error_m"].as_f64().expect("an error");
-    assert!(rms_m < LARGEST_RMS_M, "{played}");
+    assert!(rms_m < MAX_RMS_M, "{played}");
     assert_eq!(played["slowdown"], 1.0, "{played}");
     let status = answer(up, &["status", "--json"])?;
     assert_eq!(status["mode"], "track", "{status}");
     assert_eq!(status["stiffness_n_per_m"][0], 5.0, "{status}");
 
-    // Waypoints around the present place of the tip.
+    // The waypoints are around the present position of the tip.
     let at = |axis: usize| status["tip_position_m"][axis].as_f64().expect("a number");
     let waypoints = format!(
         "x_m,y_m,z_m\n{x},{y},{z}\n{x},{},{}\n{x},{},{z}\n",
@@ -71,7 +71,7 @@ fn shown_and_repeated(up: &Up) -> Option<()> {
     let tracked = answer(up, &["track", "points.csv", "--speed", "0.5", "--json"])?;
     assert!(tracked["set_points"].as_u64() > Some(5), "{tracked}");
 
-    // Out of reach: refused as a whole, before anything moves.
+    // A motion that is out of reach is refused completely before the arm moves.
     std::fs::write(&file, "x_m,y_m,z_m\n0.5,0,0.3\n5,0,0.3\n").expect("written");
     let refused = up.run(&["track", "points.csv"]);
     assert_eq!(refused.status.code(), Some(4), "{}", stderr_of(&refused));

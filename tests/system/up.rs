@@ -1,4 +1,4 @@
-//! Complete systems as processes: `supple up` with a simulated arm, and the operator commands.
+//! Tests of complete systems as processes: `supple up` with a simulated arm, and the operator commands.
 
 use crate::running::{Up, json, run, stderr_of, temporary_folder};
 use crate::support::programs;
@@ -6,7 +6,8 @@ use serde_json::Value;
 use std::process::Command;
 use tempfile::TempDir;
 
-/// Runs twice in virtual time: the logs are identical and replay. Returns the summary and the folder with the log.
+/// Runs a system twice in virtual time and asserts that the logs are identical and can be replayed. Returns the summary and the
+/// folder with the log.
 fn in_virtual_time(arguments: &[&str], seconds: &str, cycles: u64) -> (Value, TempDir) {
     let up = |name: &str| {
         let folder = temporary_folder();
@@ -16,7 +17,7 @@ fn in_virtual_time(arguments: &[&str], seconds: &str, cycles: u64) -> (Value, Te
         assert!(output.status.success(), "{}", stderr_of(&output));
         let summary = json(&output);
         let counted = summary["cycles"].as_u64();
-        // At the end the drives of an arm on a bus are set to idle, which takes some cycles.
+        // At the end, the drives of an arm on a bus are set to idle, which takes some cycles.
         let idle_cycles = if arguments.contains(&"emu") { 20 } else { 0 };
         assert!(
             counted.is_some_and(|n| (cycles..=cycles + idle_cycles).contains(&n)),
@@ -50,7 +51,7 @@ fn two_runs_in_virtual_time_give_identical_logs_that_replay() {
     assert_eq!(summary["bus_load"], 0.0);
 }
 
-/// From power-up through the pendant to tracking, with all processes.
+/// Runs all processes from power-up through activation on the pendant to tracking.
 #[test]
 fn the_emulated_arm_starts_up_is_activated_and_tracks() {
     let (summary, folder) = in_virtual_time(&["--plant", "emu"], "7", 7000);
@@ -68,7 +69,7 @@ fn the_emulated_arm_starts_up_is_activated_and_tracks() {
     assert!(at("Pressed(Activate)") < at("motor 1 Torque"));
 }
 
-/// Seven joints: at 1 kHz on shared memory; on the bus at the rate that it can carry, and an error above that rate.
+/// Seven joints run at 1 kHz on shared memory, and on the bus at its maximum rate; a higher rate is an error.
 #[test]
 fn seven_joints_run_as_processes() {
     let seven = ["--arm", "wam7"];
@@ -182,7 +183,7 @@ fn without_a_system_every_command_is_code_10() {
 }
 
 #[test]
-fn a_missing_program_is_named_with_its_build_command() {
+fn the_error_of_a_missing_program_contains_its_build_command() {
     let folder = temporary_folder();
     let alone = folder.path().join("alone");
     std::fs::create_dir(&alone).expect("a folder");
@@ -205,9 +206,9 @@ fn a_missing_program_is_named_with_its_build_command() {
     }
 }
 
-/// The exit code, the messages and the results are those of the program that draws.
+/// Exit code, messages and results are those of `supple-report`.
 #[test]
-fn demo_is_run_by_the_program_that_draws() {
+fn supple_demo_runs_supple_report() {
     let folder = temporary_folder();
     let output = Command::new(programs().join("supple"))
         .args(["demo", "--arm", "wam5", "--json"])
@@ -220,9 +221,9 @@ fn demo_is_run_by_the_program_that_draws() {
     assert_eq!(object["error"]["kind"], "description");
 }
 
-/// Without a terminal each change of mode or drives is a line.
+/// Without a terminal, each change of mode or drives is reported on a line.
 #[test]
-fn a_piped_run_says_what_the_arm_does() {
+fn a_piped_run_reports_each_change_on_a_line() {
     let folder = temporary_folder();
     let how = ["up", "--plant", "sim", "--virtual-time", "--for", "6"];
     let output = run(folder.path(), &how);
@@ -236,10 +237,10 @@ fn a_piped_run_says_what_the_arm_does() {
     assert!(!text.contains("Shift-Activate"), "{text}");
 }
 
-/// The emergency stop is named with the way out of it, and that way works. Without power the arm falls and loses its positions: the
-/// home pose that held at the start is not taken for the present one, but must be confirmed.
+/// After an emergency stop, the messages describe how to continue, and these steps work. Without power, the arm falls and loses its
+/// position reference: it is no longer in the home pose of the start, so the operator must confirm the home pose.
 #[test]
-fn an_emergency_stop_is_named_and_the_home_pose_is_not_assumed_again() {
+fn after_an_emergency_stop_the_operator_must_confirm_the_home_pose() {
     let up = Up::tracking(&["--plant", "emu"]);
     let press = |arguments: &[&str]| {
         let output = up.run(arguments);
@@ -251,13 +252,13 @@ fn an_emergency_stop_is_named_and_the_home_pose_is_not_assumed_again() {
         for button in ["release", "idle", "cradle"] {
             press(&["pendant", button]);
         }
-        // The motors wake first; the command waits for the question.
+        // The motors wake up first; the command waits for the request of the arm.
         up.run(&["at-home"])
     };
-    // Nobody is there to confirm it.
+    // Without a terminal, the pose cannot be confirmed.
     let text = stderr_of(&back(&up));
     assert!(text.contains("was not confirmed"), "{text}");
-    // The power is lost once more: the question is withdrawn.
+    // The power is lost again: the request is removed.
     press(&["pendant", "e-stop"]);
     let text = stderr_of(&up.run(&["at-home", "--yes"]));
     assert!(text.contains("no arm asks for its home pose"), "{text}");

@@ -1,4 +1,4 @@
-//! Name of a bus on the command line.
+//! Address of a bus, as given on the command line.
 
 use crate::error::BusError;
 use crate::folder::OwnerFolder;
@@ -10,9 +10,9 @@ use supple_realtime::runtime_folder;
 /// Address of a bus.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Address {
-    /// `can:NAME`, a CAN interface.
+    /// `can:NAME`: the CAN interface of this name.
     Interface(String),
-    /// `unix:FOLDER`, sockets in an owner-only folder.
+    /// `unix:FOLDER`: Unix sockets in this folder, which only its owner can access.
     Folder(PathBuf),
 }
 
@@ -43,7 +43,7 @@ impl fmt::Display for Address {
 }
 
 impl Address {
-    /// Socket folder of the system with this prefix: `supple-bus/PREFIX` under `$XDG_RUNTIME_DIR`, or
+    /// Returns the socket folder of the system with this prefix: `supple-bus/PREFIX` under `$XDG_RUNTIME_DIR`, or
     /// `/tmp/supple-bus-UID/PREFIX` if the variable is not set.
     ///
     /// # Errors

@@ -16,18 +16,18 @@ pub trait Bus {
     /// FD; the frame is then not sent.
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError>;
 
-    /// The next event, or `None` once [`Bus::now_ns`] has reached `until_ns`. With a time in the past, returns
-    /// only an event that has already arrived.
+    /// Waits for the next event and returns it, or `None` once [`Bus::now_ns`] has reached `until_ns`. With a time in the
+    /// past, returns only an event that has already arrived.
     ///
     /// # Errors
     /// If the interface or socket fails. Faults that the CAN controller reports are [`Event::Fault`].
     fn receive_until(&mut self, until_ns: u64) -> Result<Option<Event>, BusError>;
 
-    /// As [`Bus::receive_until`], with lookahead: the caller promises not to send before `frames` more frames of other nodes have
+    /// Receives as [`Bus::receive_until`] does, with lookahead: the caller promises not to send before `frames` more frames of other nodes have
     /// arrived or `until_ns` is reached. An emulated arm in another process can then return all these events in one datagram.
     ///
     /// # Errors
-    /// As [`Bus::receive_until`].
+    /// The same as those of [`Bus::receive_until`].
     fn receive_with_lookahead(
         &mut self,
         until_ns: u64,
@@ -37,7 +37,7 @@ pub trait Bus {
         self.receive_until(until_ns)
     }
 
-    /// Whether this bus carries frames of CAN FD; all carry classic ones.
+    /// Whether this bus carries CAN FD frames; every bus carries classic frames.
     fn carries_fd(&self) -> bool {
         true
     }
@@ -48,7 +48,8 @@ pub trait Bus {
         0
     }
 
-    /// CLOCK_MONOTONIC at a time of this bus \[ns\]; in virtual time, which has no such relation, the argument.
+    /// Converts a time of this bus to CLOCK_MONOTONIC \[ns\]. In virtual time, which is not related to that clock, returns
+    /// its argument.
     fn monotonic_ns(&self, time_ns: u64) -> u64 {
         time_ns
     }
@@ -99,8 +100,8 @@ pub enum Event {
     Fault(BusFault),
 }
 
-/// A condition that a CAN controller reports, in ascending order of severity; of several in one error frame the most severe
-/// counts.
+/// A condition that a CAN controller reports, in ascending order of severity. Of several conditions in one error frame,
+/// the most severe is reported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum BusFault {
     /// The controller was restarted after a bus-off.
@@ -111,13 +112,14 @@ pub enum BusFault {
     Warning,
     /// Protocol violation: bit, stuffing or checksum error.
     Protocol,
-    /// The error counters passed the passive limit: the node is error-passive: it no longer sends active error flags.
+    /// The error counters passed the passive limit: the node is error-passive and no longer sends active error flags.
     Passive,
     /// A receive or transmit buffer overflowed, and frames were lost.
     Overrun,
     /// Transceiver fault: a wire is open or shorted.
     Transceiver,
-    /// No node acknowledged a frame: none is powered, connected and at this bit rate, or an emulated bus has no peer process.
+    /// No node acknowledged a frame: no node is powered, connected and set to this bit rate, or no process serves the other
+    /// side of an emulated bus.
     NoAcknowledge,
     /// A frame was not sent in time.
     TransmitTimeout,
@@ -135,7 +137,9 @@ impl fmt::Display for BusFault {
             BusFault::Passive => "the error counters passed the passive limit",
             BusFault::Overrun => "a receive or transmit buffer overflowed, and frames were lost",
             BusFault::Transceiver => "the transceiver reports an open or shorted wire",
-            BusFault::NoAcknowledge => "no node acknowledged a frame; is the arm on and connected?",
+            BusFault::NoAcknowledge => {
+                "no node acknowledged a frame; check that the arm is switched on and connected"
+            }
             BusFault::TransmitTimeout => "a frame was not sent in time",
             BusFault::BusOff => {
                 "the CAN controller is bus-off; check cable and termination, then restart it"

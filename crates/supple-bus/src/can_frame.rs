@@ -37,8 +37,8 @@ const ERROR_CLASSES: [(u32, BusFault); 8] = [
     (0x100, BusFault::Restarted),       // RESTARTED
 ];
 /// `CAN_ERR_CRTL`: the second data byte has flags of the CAN controller's state.
-const CONTROLLER: u32 = 0x004;
-/// Flags of that byte (`CAN_ERR_CRTL_...`), those of reception and transmission together.
+const CONTROLLER_STATE: u32 = 0x004;
+/// Flags of the byte named in [`CONTROLLER_STATE`] (`CAN_ERR_CRTL_...`); each mask joins the flags of reception and transmission.
 const CONTROLLER_FLAGS: [(u8, BusFault); 3] = [
     (0x03, BusFault::Overrun), // RX_OVERFLOW, TX_OVERFLOW
     (0x0c, BusFault::Warning), // RX_WARNING, TX_WARNING
@@ -52,8 +52,8 @@ pub enum DecodedFrame {
     Data(CanFrame),
     /// An error frame.
     Fault(BusFault),
-    /// Frames that this bus does not support: remote requests, invalid lengths, and error frames without a known
-    /// fault.
+    /// A frame that this bus does not support: a remote request, a frame of invalid length, or an error frame without a
+    /// known fault.
     Unsupported,
 }
 
@@ -151,20 +151,20 @@ impl EncodedFrame {
         bytes[4] = 8;
         let class = ERROR_CLASSES.iter().find(|(_, of)| *of == fault);
         let flags = CONTROLLER_FLAGS.iter().find(|(_, of)| *of == fault);
-        let class = class.map_or(CONTROLLER, |&(class, _)| class);
+        let class = class.map_or(CONTROLLER_STATE, |&(class, _)| class);
         bytes[..4].copy_from_slice(&(ERROR | class).to_ne_bytes());
         bytes[9] = flags.map_or(0, |&(flags, _)| flags);
         EncodedFrame { bytes, fd: false }
     }
 }
 
-/// The most severe fault in an error frame.
+/// Returns the most severe fault in an error frame.
 fn most_severe_fault(id: u32, data: &[u8]) -> Option<BusFault> {
     let controller = data.get(1).copied().unwrap_or(0);
     let classes = ERROR_CLASSES.iter().filter(|(class, _)| id & class != 0);
     let flags = CONTROLLER_FLAGS
         .iter()
-        .filter(|(flags, _)| id & CONTROLLER != 0 && controller & flags != 0);
+        .filter(|(flags, _)| id & CONTROLLER_STATE != 0 && controller & flags != 0);
     let faults = classes.map(|&(_, fault)| fault);
     faults.chain(flags.map(|&(_, fault)| fault)).max()
 }

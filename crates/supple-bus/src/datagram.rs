@@ -1,8 +1,8 @@
 //! A bus of two nodes over Unix datagrams: the host and the emulated arm.
 //!
-//! Each datagram is a raw `struct can_frame` or `struct canfd_frame`: a data frame or an error frame. There is no bit rate: the
-//! arm's side may delay its frames. A frame counts as sent when the peer's socket has accepted it; without a
-//! peer frames are not acknowledged, as on a real bus without an arm. No data leave the machine.
+//! Each datagram is a raw `struct can_frame` or `struct canfd_frame`: a data frame or an error frame. The
+//! bus has no bit rate; the arm's side may delay its frames. A frame counts as sent once the peer's socket has accepted it.
+//! Without a peer, frames are not acknowledged, as on a real bus without an arm. No data leave the machine.
 
 use crate::bus::{Bus, BusFault, Event};
 use crate::can_frame::{DecodedFrame, EncodedFrame, FD_FRAME_BYTES};
@@ -28,7 +28,7 @@ pub enum Side {
 }
 
 impl Side {
-    /// Names of the own socket and of the peer's.
+    /// Returns the names of this side's socket and of the peer's socket.
     pub(crate) fn sockets(self) -> (&'static str, &'static str) {
         match self {
             Side::Host => ("host.can", "arm.can"),
@@ -45,7 +45,7 @@ pub struct DatagramBus {
 }
 
 impl DatagramBus {
-    /// Opens one side in a folder; the other side may connect later, and may disconnect and connect again.
+    /// Opens one side of the bus in a folder; the other side may connect later, and may disconnect and connect again.
     ///
     /// # Errors
     /// If the folder is not accessible only to its owner, or another process has opened this side.

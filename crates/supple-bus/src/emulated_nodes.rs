@@ -1,4 +1,4 @@
-//! The arm as seen from its bus.
+//! Interface of the emulated nodes of an arm.
 
 use crate::bus::Event;
 use supple_can_frame::CanFrame;
@@ -8,10 +8,9 @@ pub trait EmulatedNodes {
     /// Time of the bus \[ns\].
     fn now_ns(&self) -> u64;
 
-    /// The host sends a frame at the current time.
+    /// Receives a frame that the host sends at the current time.
     fn host_sends(&mut self, frame: &CanFrame);
 
-    /// Runs to the next event for the host or to `until_ns`, whichever comes first; the time is then that of the
-    /// event or `until_ns`.
+    /// Advances the time to the next event for the host, which it returns, or to `until_ns`, whichever comes first.
     fn run_until(&mut self, until_ns: u64) -> Option<Event>;
 }

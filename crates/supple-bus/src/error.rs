@@ -3,7 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 
-/// The bus itself is missing or unusable. Faults on the bus are [`crate::BusFault`]s.
+/// Error in opening or using a bus. Conditions that a CAN controller reports are [`crate::BusFault`]s instead.
 #[derive(Debug, thiserror::Error)]
 pub enum BusError {
     /// The transmit queue is full.
@@ -11,9 +11,9 @@ pub enum BusError {
         "the transmit queue is full: frames are queued faster than the bus sends them, or the bus sends nothing"
     )]
     Full,
-    /// A frame of CAN FD for an interface that carries classic frames only.
+    /// A CAN FD frame cannot be sent on an interface that carries classic frames only.
     #[error(
-        "CAN interface `{interface}` carries classic frames only, and a frame of CAN FD was to be sent: set it to \
+        "CAN interface `{interface}` carries classic frames only, but a CAN FD frame was to be sent: set it to \
          CAN FD (ip link set {interface} type can bitrate 1000000 dbitrate 5000000 fd on), or set the arm's motors and \
          its TOML to classic CAN"
     )]
@@ -21,7 +21,7 @@ pub enum BusError {
         /// Name of the interface.
         interface: String,
     },
-    /// A CAN interface that cannot be opened.
+    /// A CAN interface cannot be opened.
     #[error("CAN interface `{interface}`: {source}; {remedy}")]
     Interface {
         /// Requested name.
@@ -31,7 +31,7 @@ pub enum BusError {
         /// Remedy.
         remedy: &'static str,
     },
-    /// A folder or socket that cannot be created or used, or that other users can access.
+    /// A folder or socket cannot be created or used, or other users can access it.
     #[error("{} {problem}; {remedy}", path.display())]
     Folder {
         /// The folder or socket.

@@ -1,4 +1,4 @@
-//! Fault injection: a decorator for any bus.
+//! Fault injection: [`FaultInjector`] wraps any bus.
 //!
 //! A [`FaultRule`] specifies the fault, the frames, the time window, and the probability. Time is bus time; the
 //! random numbers come from a seed, so that runs are reproducible. Delayed frames and events are released in the
@@ -12,10 +12,10 @@ use supple_random::Random;
 
 /// Direction of the frames that a rule affects.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Traffic {
+pub enum TrafficDirection {
     /// Frames that this node sends.
     Sent,
-    /// Frames that this node would receive.
+    /// Frames that this node receives.
     Received,
 }
 
@@ -44,7 +44,7 @@ pub enum FaultKind {
 #[derive(Clone, Copy, Debug)]
 pub struct FaultRule {
     /// Direction. Ignored for [`FaultKind::BusOff`].
-    pub traffic: Traffic,
+    pub traffic: TrafficDirection,
     /// Frames that the rule affects; `None` for all.
     pub only: Option<fn(CanId) -> bool>,
     /// Start of the window in bus time \[ns\].
@@ -58,8 +58,8 @@ pub struct FaultRule {
 }
 
 impl FaultRule {
-    /// A rule for every frame of a direction, at all times.
-    pub fn always(traffic: Traffic, kind: FaultKind) -> FaultRule {
+    /// Returns a rule that affects every frame of a direction, at all times.
+    pub fn always(traffic: TrafficDirection, kind: FaultKind) -> FaultRule {
         FaultRule {
             traffic,
             only: None,
@@ -70,7 +70,7 @@ impl FaultRule {
         }
     }
 
-    /// The same rule within a window of time \[ns\].
+    /// Limits the rule to a time window \[ns\].
     pub fn within(self, from_ns: u64, until_ns: u64) -> FaultRule {
         FaultRule {
             from_ns,
@@ -79,7 +79,7 @@ impl FaultRule {
         }
     }
 
-    /// The same rule for frames of these ids only.
+    /// Limits the rule to frames whose id satisfies `ids`.
     pub fn only(self, ids: fn(CanId) -> bool) -> FaultRule {
         FaultRule {
             only: Some(ids),
@@ -87,7 +87,7 @@ impl FaultRule {
         }
     }
 
-    /// The same rule with a probability for each frame, 0 to 1.
+    /// Sets the probability with which the rule affects each frame, 0 to 1.
     pub fn with_probability(self, probability: f64) -> FaultRule {
         FaultRule {
             probability,
@@ -106,12 +106,12 @@ pub struct FaultInjector<B> {
     bus: B,
     rules: Vec<FaultRule>,
     random: Random,
-    /// Delayed events for the host, each with its due time \[ns\]; sorted by it.
+    /// Delayed events for the host, each with its due time \[ns\]; sorted by due time.
     events: VecDeque<(u64, Event)>,
-    /// Delayed frames of the host, each with its due time \[ns\]; sorted by it.
+    /// Delayed frames of the host, each with its due time \[ns\]; sorted by due time.
     frames: VecDeque<(u64, CanFrame)>,
     /// A received frame that is held back until the next one has been delivered, at the latest until this time \[ns\].
-    overtaken: Option<(u64, Event)>,
+    held_back: Option<(u64, Event)>,
     bus_off: bool,
 }
 
@@ -124,7 +124,7 @@ impl<B: Bus> FaultInjector<B> {
             random: Random::new(seed),
             events: VecDeque::with_capacity(256),
             frames: VecDeque::with_capacity(256),
-            overtaken: None,
+            held_back: None,
             bus_off: false,
         }
     }
@@ -154,7 +154,7 @@ impl<B: Bus> FaultInjector<B> {
         unit < probability
     }
 
-    fn fault_for(&mut self, traffic: Traffic, id: CanId) -> Option<FaultKind> {
+    fn fault_for(&mut self, traffic: TrafficDirection, id: CanId) -> Option<FaultKind> {
         let now = self.bus.now_ns();
         for i in 0..self.rules.len() {
             let rule = self.rules[i];
@@ -213,8 +213,8 @@ impl<B: Bus> FaultInjector<B> {
         let window_bounds = windows.flat_map(|rule| [rule.from_ns, rule.until_ns]);
         let events = self.events.front().map(|(due, _)| *due);
         let frames = self.frames.front().map(|(due, _)| *due);
-        let overtaken = self.overtaken.map(|(due, _)| due);
-        let delayed = [events, frames, overtaken].into_iter().flatten();
+        let held_back = self.held_back.map(|(due, _)| due);
+        let delayed = [events, frames, held_back].into_iter().flatten();
         let window_bound = window_bounds.filter(|bound| *bound > now).min();
         delayed.chain(window_bound).min().unwrap_or(u64::MAX)
     }
@@ -233,10 +233,10 @@ impl<B: Bus> FaultInjector<B> {
             self.frames.pop_front();
             self.bus.send(&frame)?;
         }
-        if let Some((due, event)) = self.overtaken
+        if let Some((due, event)) = self.held_back
             && due <= now
         {
-            self.overtaken = None;
+            self.held_back = None;
             return Ok(Some(event));
         }
         match self.events.front().copied() {
@@ -252,9 +252,9 @@ impl<B: Bus> FaultInjector<B> {
     fn apply_to_received(&mut self, frame: CanFrame) -> Option<Event> {
         let now = self.bus.now_ns();
         let event = Event::Frame(frame);
-        let kind = self.fault_for(Traffic::Received, frame.id());
-        if let (Some((_, earlier)), None) = (self.overtaken, kind) {
-            self.overtaken = None;
+        let kind = self.fault_for(TrafficDirection::Received, frame.id());
+        if let (Some((_, earlier)), None) = (self.held_back, kind) {
+            self.held_back = None;
             self.delay_event(now, earlier);
             return Some(event);
         }
@@ -269,13 +269,13 @@ impl<B: Bus> FaultInjector<B> {
                 self.delay_event(now, event);
                 Some(event)
             }
-            Some(FaultKind::Reorder(delay_ns)) => match self.overtaken.take() {
+            Some(FaultKind::Reorder(delay_ns)) => match self.held_back.take() {
                 Some((_, earlier)) => {
                     self.delay_event(now, earlier);
                     Some(event)
                 }
                 None => {
-                    self.overtaken = Some((now + delay_ns, event));
+                    self.held_back = Some((now + delay_ns, event));
                     None
                 }
             },
@@ -309,7 +309,7 @@ impl<B: Bus> Bus for FaultInjector<B> {
         if self.bus_off {
             return Ok(());
         }
-        match self.fault_for(Traffic::Sent, frame.id()) {
+        match self.fault_for(TrafficDirection::Sent, frame.id()) {
             None | Some(FaultKind::BusOff) => self.bus.send(frame),
             Some(FaultKind::Loss) => {
                 self.delay_event(now, Event::Sent(*frame));

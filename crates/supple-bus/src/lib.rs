@@ -1,23 +1,22 @@
-//! One node's view of a CAN bus.
+//! Access of one node to a CAN bus.
 //!
 //! A [`Bus`] sends frames and returns [`Event`]s: frames of other nodes, confirmations of sent frames, and bus
 //! faults. It also owns the time: [`Bus::receive_until`] is the only way to wait. On a real bus the time is the
 //! machine's monotonic clock; in [`virtual_time`] it is the time of the emulated arm, which advances exactly as
-//! far as the host waits. The same host code runs on both; in virtual time it runs as fast as possible, and its
-//! results are bit-identical in every run.
+//! far as the host waits. The same host code runs on both. In virtual time it runs as fast as the machine allows, and
+//! its results are bit-identical in every run.
 //!
-//! | backend | is |
+//! | backend | description |
 //! |---|---|
 //! | [`SocketCan`] | a CAN interface of the kernel, real or `vcan` |
-//! | [`DatagramBus`] | Unix datagrams in an owner-only folder, each one a raw frame as of SocketCAN |
+//! | [`DatagramBus`] | Unix datagrams in an owner-only folder, each one a raw SocketCAN frame |
 //! | [`virtual_time::DirectBus`] | the emulated arm in the same process |
 //! | [`virtual_time::LockstepBus`] | the emulated arm in another process |
 //! | [`PacedBus`] | an emulated arm in another process, synchronised to the wall clock |
-//! | [`FaultInjector`] | a decorator that injects faults into any of these |
+//! | [`FaultInjector`] | wraps any of these and injects faults |
 //!
-//! It transports frames of classic CAN and CAN FD and has no protocol: codecs such as `supple-puck` encode and
-//! decode their contents. Sending and receiving allocate
-//! nothing.
+//! A bus transports classic CAN and CAN FD frames without interpreting their payload; codecs such as `supple-puck` encode
+//! and decode it. Sending and receiving allocate no memory.
 
 #![forbid(unsafe_code)]
 
@@ -43,7 +42,7 @@ pub use bus::{Bus, BusFault, Event};
 pub use can_frame::{CAN_FRAME_BYTES, DecodedFrame, EncodedFrame, FD_FRAME_BYTES};
 pub use datagram::{DatagramBus, Side};
 pub use error::BusError;
-pub use fault::{FaultInjector, FaultKind, FaultRule, Traffic};
+pub use fault::{FaultInjector, FaultKind, FaultRule, TrafficDirection};
 pub use folder::OwnerFolder;
 pub use paced::{PacedBus, PacedResponder};
 pub use socket_can::SocketCan;

@@ -19,7 +19,7 @@ pub(crate) struct LockstepClient {
 
 /// Next item of the buffered answer.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Next {
+pub(crate) enum NextItem {
     Event(Entry),
     /// The requested time was reached \[ns\].
     Reached(u64),
@@ -46,15 +46,15 @@ impl LockstepClient {
     }
 
     /// Returns the next buffered item for a host that waits until `until_ns`.
-    pub fn next(&mut self, until_ns: u64) -> Next {
+    pub fn next(&mut self, until_ns: u64) -> NextItem {
         if let Some(entry) = self.received_events.pop_front() {
-            return Next::Event(entry);
+            return NextItem::Event(entry);
         }
         match self.reached_ns.take() {
             Some(reached_ns) if until_ns <= reached_ns && self.request.is_empty() => {
-                Next::Reached(reached_ns)
+                NextItem::Reached(reached_ns)
             }
-            _ => Next::NeedRequest,
+            _ => NextItem::NeedRequest,
         }
     }
 
@@ -72,13 +72,13 @@ impl LockstepClient {
         endpoint.send(self.request.emit(&mut self.bytes))
     }
 
-    /// Clears the request, answered or not, so that its frames are not sent twice.
+    /// Removes all frames from the request, so that they are not sent twice.
     pub fn clear_request(&mut self) {
         self.request.clear();
     }
 
-    /// The answer to the last request, if it has arrived. Answers to earlier requests that timed out are
-    /// discarded with their events.
+    /// Returns the answer to the last request, if it has arrived. Discards answers to earlier requests that timed out, with
+    /// their events.
     pub fn answer(&mut self, endpoint: &Endpoint) -> Result<Option<Message>, BusError> {
         while let Some(bytes) = endpoint.receive_into(&mut self.bytes)? {
             let answer = Message::parse(bytes).filter(|m| m.kind != Kind::RunUntil);

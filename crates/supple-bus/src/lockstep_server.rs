@@ -16,7 +16,7 @@ pub(crate) struct LockstepServer {
 }
 
 impl LockstepServer {
-    /// A request that has not been started.
+    /// Creates the server of a request that has not been started.
     pub fn new(request: Message) -> LockstepServer {
         LockstepServer {
             answer: Message::new(Kind::Stopped, 0, request.sequence),
@@ -33,7 +33,7 @@ impl LockstepServer {
             // All frames of the request are delivered before the answer.
             let frame = self.request.host_frame(self.delivered);
             if frame.is_none() && self.is_complete() {
-                return Some(self.ended(Kind::Stopped, nodes.now_ns()));
+                return Some(self.finish(Kind::Stopped, nodes.now_ns()));
             }
             let until_ns = frame.map_or(self.request.time_ns, |(time_ns, _)| time_ns);
             let until_ns = until_ns.max(nodes.now_ns());
@@ -47,7 +47,7 @@ impl LockstepServer {
                     nodes.host_sends(&frame);
                     self.delivered += 1;
                 }
-                (None, None) => return Some(self.ended(Kind::Reached, nodes.now_ns())),
+                (None, None) => return Some(self.finish(Kind::Reached, nodes.now_ns())),
             }
         }
     }
@@ -60,7 +60,7 @@ impl LockstepServer {
         }
     }
 
-    fn ended(&mut self, kind: Kind, time_ns: u64) -> &mut Message {
+    fn finish(&mut self, kind: Kind, time_ns: u64) -> &mut Message {
         self.answer.kind = kind;
         self.answer.time_ns = time_ns;
         &mut self.answer

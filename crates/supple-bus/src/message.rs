@@ -67,7 +67,7 @@ pub(crate) struct Message {
 }
 
 impl Message {
-    /// A message without entries.
+    /// Creates a message without entries.
     pub fn new(kind: Kind, time_ns: u64, sequence: u32) -> Message {
         Message {
             kind,
@@ -111,7 +111,7 @@ impl Message {
         self.entries[..self.count].iter().flatten()
     }
 
-    /// The host's frame in an entry, with its time.
+    /// Returns the frame of the host in the entry at `index`, with its time.
     pub fn host_frame(&self, index: usize) -> Option<(u64, CanFrame)> {
         match self.entries[..self.count].get(index)?.as_ref()? {
             Entry {

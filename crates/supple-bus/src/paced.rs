@@ -1,6 +1,6 @@
 //! An emulated bus in real time: the arm's process owns the bus time, and the host synchronises it to CLOCK_MONOTONIC.
 //!
-//! A real bus answers within microseconds whatever the load of the machine; an emulating process may not. The
+//! A real bus answers within microseconds, whatever the load of the machine; an emulator process may take longer. The
 //! host therefore sends requests as in virtual time ([`LockstepBus`](crate::virtual_time::LockstepBus)), the arm
 //! computes the answer at once, and the host delivers the events of an answer once the clock reaches the answer's time. If the
 //! arm's process stalls, bus time pauses for both sides, so that no reply is lost. If the host stalls by up to 20 ms, bus time
@@ -14,7 +14,7 @@ use crate::emulated_nodes::EmulatedNodes;
 use crate::endpoint::{Delivery, Endpoint};
 use crate::error::BusError;
 use crate::folder::OwnerFolder;
-use crate::lockstep_client::{LockstepClient, Next};
+use crate::lockstep_client::{LockstepClient, NextItem};
 use crate::lockstep_server::LockstepServer;
 use crate::message::{Kind, MAX_BYTES, Message};
 use crate::wait::wait_readable_until;
@@ -45,11 +45,11 @@ pub struct PacedBus {
     client: LockstepClient,
     /// Latest bus time that the arm has answered \[ns\].
     last_answer_ns: u64,
-    /// CLOCK_MONOTONIC less bus time \[ns\].
+    /// CLOCK_MONOTONIC minus bus time \[ns\].
     offset_ns: u64,
     /// Offset at the start \[ns\]; its growth since then is the paused time.
     first_offset_ns: u64,
-    /// The arm did not answer the last request.
+    /// Whether the arm left the last request unanswered.
     lost: bool,
 }
 
@@ -57,7 +57,7 @@ impl PacedBus {
     /// Opens the host's side and adopts the time of the arm's process, which must be running.
     ///
     /// # Errors
-    /// If the folder is not accessible only to its owner, another process is the host, or no arm answers.
+    /// If the folder is not accessible only to its owner, another process has opened the host's side, or no arm answers.
     pub fn open(folder: &OwnerFolder) -> Result<PacedBus, BusError> {
         let (own, peer) = Side::Host.sockets();
         let mut bus = PacedBus {
@@ -102,12 +102,12 @@ impl PacedBus {
         }
     }
 
-    /// CLOCK_MONOTONIC as bus time \[ns\].
+    /// Returns the current CLOCK_MONOTONIC, converted to bus time \[ns\].
     fn clock_as_bus_time_ns(&self) -> u64 {
         monotonic_ns().saturating_sub(self.offset_ns)
     }
 
-    /// Pause of emulated time due to the current stall of the host \[ns\].
+    /// Returns the time for which emulated time must pause because the host has stalled \[ns\].
     fn host_stall_ns(&self) -> u64 {
         match self
             .clock_as_bus_time_ns()
@@ -127,7 +127,7 @@ impl PacedBus {
         request.offset_ns = self.offset_ns;
         request.sent_ns = requested_ns;
         let delivered = self.client.send_request(&self.endpoint)?;
-        // Cleared even if not delivered: a frame without a receiver is never confirmed.
+        // The request is cleared even if it was not delivered: a frame without a receiver is never confirmed.
         self.client.clear_request();
         let until_monotonic_ns = until_ns + self.offset_ns;
         let deadline_ns = match delivered {
@@ -191,14 +191,14 @@ impl Bus for PacedBus {
         frames: u32,
     ) -> Result<Option<Event>, BusError> {
         match self.client.next(until_ns) {
-            Next::Event(entry) => return Ok(Some(entry.event)),
-            Next::Reached(_) => return Ok(None),
-            Next::NeedRequest => self.exchange(until_ns, frames)?,
+            NextItem::Event(entry) => return Ok(Some(entry.event)),
+            NextItem::Reached(_) => return Ok(None),
+            NextItem::NeedRequest => self.exchange(until_ns, frames)?,
         }
         match self.client.next(until_ns) {
-            Next::Event(entry) => Ok(Some(entry.event)),
-            // No events come from an arm that does not answer.
-            Next::Reached(_) | Next::NeedRequest => Ok(None),
+            NextItem::Event(entry) => Ok(Some(entry.event)),
+            // An arm that does not answer sends no events.
+            NextItem::Reached(_) | NextItem::NeedRequest => Ok(None),
         }
     }
 }
@@ -215,10 +215,10 @@ pub struct PacedResponder {
 }
 
 impl PacedResponder {
-    /// Opens the arm's side in a folder; the arm's time is now `now_ns`.
+    /// Opens the arm's side in a folder; `now_ns` is the current time of the arm.
     ///
     /// # Errors
-    /// If the folder is not accessible only to its owner, or another process is the arm.
+    /// If the folder is not accessible only to its owner, or another process has opened the arm's side.
     pub fn open(folder: &OwnerFolder, now_ns: u64) -> Result<PacedResponder, BusError> {
         let (own, peer) = Side::Arm.sockets();
         Ok(PacedResponder {
@@ -229,13 +229,13 @@ impl PacedResponder {
         })
     }
 
-    /// CLOCK_MONOTONIC as bus time \[ns\].
+    /// Returns the current CLOCK_MONOTONIC, converted to bus time \[ns\].
     fn clock_as_bus_time_ns(&self) -> u64 {
         monotonic_ns().saturating_sub(self.offset_ns)
     }
 
     /// Serves one slice: advances the arm by up to a millisecond of bus time, or waits that long for a request. Without a host it
-    /// advances the arm to the present.
+    /// advances the arm to the current time of the clock.
     ///
     /// # Errors
     /// If the socket fails. A missing host is not an error; another may connect.
@@ -261,7 +261,7 @@ impl PacedResponder {
         Ok(())
     }
 
-    /// The next request, if one arrives within a millisecond.
+    /// Returns the next request, if one arrives within a millisecond.
     fn next(&mut self, bytes: &mut [u8]) -> Result<Option<LockstepServer>, BusError> {
         let mut read = self.endpoint.receive_into(bytes)?.map(<[u8]>::len);
         if read.is_none() {
@@ -277,7 +277,7 @@ impl PacedResponder {
         }))
     }
 
-    /// CLOCK_MONOTONIC less bus time \[ns\].
+    /// CLOCK_MONOTONIC minus bus time \[ns\].
     pub fn offset_ns(&self) -> u64 {
         self.offset_ns
     }

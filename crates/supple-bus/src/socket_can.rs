@@ -1,9 +1,8 @@
 //! A CAN interface of the Linux kernel.
 //!
-//! The socket receives its own messages as echoes, so that a frame counts as sent only when the driver confirms
-//! it, all error frames, and a count of the frames that were lost because they were not read in time
-//! (`SO_RXQ_OVFL`). It carries frames of classic CAN, and those of CAN FD if the interface does; remote requests are
-//! ignored. Bit rates and automatic restart are properties of the interface, set when it is brought up:
+//! The socket receives echoes of its own frames (a frame counts as sent only when the driver confirms it), all error
+//! frames, and a count of the frames that were lost because they were not read in time (`SO_RXQ_OVFL`). It carries
+//! classic CAN frames, and CAN FD frames if the interface carries them; it ignores remote requests. Bit rates and automatic restart are properties of the interface, set when it is brought up:
 //! `ip link set can0 up type can bitrate 1000000 restart-ms 100`, for CAN FD with `dbitrate 5000000 fd on`.
 
 use crate::bus::{Bus, BusFault, Event};
@@ -32,13 +31,13 @@ pub struct SocketCan {
     socket: CanFdSocket,
     /// Name of the interface.
     interface: String,
-    /// The interface carries FD frames.
+    /// Whether the interface carries FD frames.
     fd: bool,
-    /// An overrun has occurred: from then on the kernel attaches its counter to every frame.
+    /// Whether an overrun has occurred; from then on the kernel attaches its counter to every frame.
     overrun_counting: bool,
     /// Number of frames lost.
     lost: u64,
-    /// The kernel's counter of lost frames, which wraps.
+    /// Counter of lost frames as the kernel last reported it; it wraps.
     lost_by_kernel: u32,
     control: Vec<u8>,
 }
@@ -75,8 +74,8 @@ impl SocketCan {
         })
     }
 
-    /// Number of frames that were lost because they were not read in time, as the kernel told with the last frame read: a loss after
-    /// it shows with the next frame. Each gap is also reported as [`BusFault::Overrun`].
+    /// Number of frames that were lost because they were not read in time, as the kernel reported with the last frame that was
+    /// read; a later loss is reported with the next frame. Each gap is also reported as [`BusFault::Overrun`].
     pub fn lost(&self) -> u64 {
         self.lost
     }
@@ -91,7 +90,7 @@ impl SocketCan {
             .map_err(BusError::io("sending an error frame to the CAN interface"))
     }
 
-    /// Whether frames were lost before the next one.
+    /// Returns whether frames were lost before the next frame.
     fn detect_overrun(&mut self) -> Result<bool, BusError> {
         let mut raw = [0; FD_FRAME_BYTES];
         let mut buffers = [IoSliceMut::new(&mut raw)];
@@ -139,7 +138,7 @@ impl SocketCan {
                 Err(Errno::INTR) => continue,
                 Err(errno) => return Err(BusError::io("receiving from the CAN interface")(errno)),
             };
-            // This read had no buffer for the counter; it is read with the next frame.
+            // This read had no buffer for the counter; the next read has one.
             self.overrun_counting |= message.flags.contains(ReturnFlags::CTRUNC);
             match DecodedFrame::decode(&raw[..message.bytes]) {
                 DecodedFrame::Data(frame) if message.flags.bits() & CONFIRM != 0 => {
@@ -194,7 +193,7 @@ impl AsFd for SocketCan {
     }
 }
 
-/// Whether an interface carries FD frames: its largest transfer is then a `struct canfd_frame`.
+/// Whether an interface carries FD frames: its MTU is then the size of a `struct canfd_frame`.
 fn carries_fd(interface: &str) -> bool {
     let mtu = std::fs::read_to_string(format!("/sys/class/net/{interface}/mtu"));
     let mtu = mtu.ok().and_then(|text| text.trim().parse::<usize>().ok());
@@ -204,15 +203,17 @@ fn carries_fd(interface: &str) -> bool {
 fn remedy(error: &io::Error) -> &'static str {
     match error.raw_os_error().map(Errno::from_raw_os_error) {
         Some(Errno::NODEV) => {
-            "there is no such interface: see `ip -details link`, load the driver of the CAN card"
+            "the interface does not exist: list the interfaces with `ip -details link`, load the driver of the CAN card"
         }
         Some(Errno::AFNOSUPPORT) => {
-            "this kernel has no CAN: load the modules can and can_raw, or use a kernel that has them"
+            "this kernel has no CAN support: load the modules can and can_raw, or use a kernel that has them"
         }
         Some(Errno::NETDOWN) => {
-            "bring it up: ip link set can0 up type can bitrate 1000000 restart-ms 100"
+            "the interface is down: bring it up with `ip link set can0 up type can bitrate 1000000 restart-ms 100`"
         }
-        Some(Errno::PERM | Errno::ACCESS) => "you may not open it: CAP_NET_RAW is required",
-        _ => "see `ip -details link`",
+        Some(Errno::PERM | Errno::ACCESS) => {
+            "opening it requires the capability CAP_NET_RAW: run as a user who has it"
+        }
+        _ => "check the interface with `ip -details link`",
     }
 }

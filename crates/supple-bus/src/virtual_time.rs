@@ -1,7 +1,7 @@
 //! A bus in virtual time: the arm's side owns the time, which advances only while the host waits.
 //!
-//! In one process the arm is a [`EmulatedNodes`] inside a [`DirectBus`]. Between processes the host has a
-//! [`LockstepBus`], the arm's process a [`LockstepResponder`]; the two exchange datagrams in the folder of
+//! In one process, a [`DirectBus`] contains the arm as [`EmulatedNodes`]. Between two processes, the host uses a
+//! [`LockstepBus`] and the arm's process a [`LockstepResponder`]; they exchange datagrams in the folder of
 //! [`DatagramBus`](crate::DatagramBus).
 //!
 //! The host sends any number of frames, then "run until", and waits. The arm answers with the first event for
@@ -15,7 +15,7 @@ pub use crate::emulated_nodes::EmulatedNodes;
 use crate::endpoint::{Delivery, Endpoint};
 use crate::error::BusError;
 use crate::folder::OwnerFolder;
-use crate::lockstep_client::{LockstepClient, Next};
+use crate::lockstep_client::{LockstepClient, NextItem};
 use crate::lockstep_server::LockstepServer;
 use crate::message::{Kind, MAX_BYTES, Message};
 use crate::wait::wait_readable_until;
@@ -23,7 +23,7 @@ use rustix::fd::{AsFd, BorrowedFd};
 use supple_can_frame::CanFrame;
 use supple_realtime::monotonic_ns;
 
-/// The host's bus, with the emulated nodes in the same process.
+/// Bus of the host, with the emulated nodes in the same process.
 #[derive(Debug)]
 pub struct DirectBus<P>(pub P);
 
@@ -45,7 +45,7 @@ impl<P: EmulatedNodes> Bus for DirectBus<P> {
 /// Timeout for an answer, in real time. It does not affect bus time; it detects an arm process that has ended.
 const ANSWER_TIMEOUT_NS: u64 = 5_000_000_000;
 
-/// The host's bus, with the arm in another process.
+/// Bus of the host, with the emulated nodes in another process.
 #[derive(Debug)]
 pub struct LockstepBus {
     endpoint: Endpoint,
@@ -76,7 +76,7 @@ impl LockstepBus {
         loop {
             match self.client.send_request(&self.endpoint)? {
                 Delivery::Delivered => break,
-                // The peer has yet to read its queue. Bus time does not advance while this process retries.
+                // The peer has not read its queue yet. Bus time does not advance while this process retries.
                 Delivery::Full if monotonic_ns() < deadline_ns => std::thread::yield_now(),
                 Delivery::Full | Delivery::NoPeer => return Err(self.no_peer()),
             }
@@ -118,15 +118,15 @@ impl Bus for LockstepBus {
     ) -> Result<Option<Event>, BusError> {
         loop {
             match self.client.next(until_ns) {
-                Next::Event(entry) => {
+                NextItem::Event(entry) => {
                     self.now_ns = entry.time_ns;
                     return Ok(Some(entry.event));
                 }
-                Next::Reached(time_ns) => {
+                NextItem::Reached(time_ns) => {
                     self.now_ns = time_ns;
                     return Ok(None);
                 }
-                Next::NeedRequest => {
+                NextItem::NeedRequest => {
                     self.client.prepare_request(until_ns, frames);
                     self.exchange()?;
                 }
@@ -153,7 +153,7 @@ impl LockstepResponder {
         })
     }
 
-    /// Serves one request of the host; `false` if none arrived within `timeout_ns` of real time.
+    /// Serves one request of the host; returns `false` if no request arrived within `timeout_ns` of real time.
     ///
     /// # Errors
     /// If the socket fails. A host that has ended is not an error; another may connect.

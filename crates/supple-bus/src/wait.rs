@@ -8,8 +8,8 @@ use supple_realtime::monotonic_ns;
 
 const NS_PER_S: u64 = 1_000_000_000;
 
-/// Whether `fd` can be read before the monotonic clock reaches `until_ns`. A signal ends the wait early
-/// with `false`.
+/// Waits until `fd` can be read and returns `true`, or `false` once the monotonic clock has reached `until_ns`. A signal
+/// ends the wait early with `false`.
 ///
 /// # Errors
 /// If the system call fails.

@@ -1,4 +1,4 @@
-//! Frames that are not read in time from a CAN interface of the kernel are lost, but reported and counted.
+//! A CAN interface of the kernel loses frames that are not read in time; the bus reports and counts them.
 //! `./ci.sh socketcan` provides such an interface.
 
 use supple_bus::{Bus, BusError, BusFault, Event, SocketCan};
@@ -19,7 +19,7 @@ fn send(bus: &mut SocketCan, number: u64) {
     while bus.receive_until(0).unwrap().is_some() {}
 }
 
-/// Numbers of frames and gaps that can be read.
+/// Reads all received events; returns the numbers of frames and of reported gaps.
 fn read(bus: &mut SocketCan) -> (u64, u64) {
     let (mut frames, mut gaps) = (0, 0);
     while let Some(event) = bus.receive_until(0).unwrap() {

@@ -8,7 +8,7 @@ pub const MAX_CLASSIC_BYTES: usize = 8;
 /// Maximum payload of an FD frame \[bytes\].
 pub const MAX_FD_BYTES: usize = 64;
 
-/// Payload lengths of the data length codes 9 to 15 of an FD frame \[bytes\]; below, code and length are equal.
+/// Payload lengths of the data length codes 9 to 15 of an FD frame \[bytes\]. For codes 0 to 8, the length equals the code.
 const LONG_LENGTHS: [u8; 7] = [12, 16, 20, 24, 32, 48, 64];
 
 /// Format of a frame.
@@ -36,11 +36,11 @@ pub struct CanFrame {
 /// Error: not a valid frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
-    /// An id that is too large.
+    /// The id is too large.
     Id(CanIdError),
-    /// A payload of this many bytes in a classic frame; the maximum is eight.
+    /// A classic frame cannot carry a payload of this many bytes; the maximum is eight.
     TooLong(usize),
-    /// A payload of this many bytes in an FD frame, which carries 0 to 8, 12, 16, 20, 24, 32, 48 or 64.
+    /// An FD frame cannot carry a payload of this many bytes, only 0 to 8, 12, 16, 20, 24, 32, 48 or 64.
     FdLength(usize),
 }
 
@@ -71,10 +71,10 @@ impl From<CanIdError> for FrameError {
 }
 
 impl CanFrame {
-    /// A classic frame with `payload`, eight bytes at most.
+    /// Creates a classic frame with a payload of at most eight bytes.
     ///
     /// # Errors
-    /// A longer payload.
+    /// [`FrameError::TooLong`] for a longer payload.
     pub fn new(id: impl Into<CanId>, payload: &[u8]) -> Result<CanFrame, FrameError> {
         if payload.len() > MAX_CLASSIC_BYTES {
             return Err(FrameError::TooLong(payload.len()));
@@ -82,19 +82,18 @@ impl CanFrame {
         Ok(CanFrame::with(id.into(), FrameFormat::Classic, payload))
     }
 
-    /// A classic frame with a standard id, from the number that a CAN driver reports; the caller has removed the
-    /// driver's flags.
+    /// Creates a classic frame with a standard id from the number that a CAN driver reports, without the driver's flags.
     ///
     /// # Errors
-    /// An id above 0x7FF, or a payload of more than eight bytes.
+    /// [`FrameError`] for an id above 0x7FF or a payload of more than eight bytes.
     pub fn from_raw(id: u32, payload: &[u8]) -> Result<CanFrame, FrameError> {
         CanFrame::new(CanId::standard(id)?, payload)
     }
 
-    /// An FD frame with `payload`; its data phase is sent at the data bit rate with `bit_rate_switch`.
+    /// Creates an FD frame; with `bit_rate_switch` its data phase is sent at the data bit rate.
     ///
     /// # Errors
-    /// A length other than 0 to 8, 12, 16, 20, 24, 32, 48 or 64 bytes.
+    /// [`FrameError::FdLength`] for a payload length other than 0 to 8, 12, 16, 20, 24, 32, 48 or 64 bytes.
     pub fn fd(
         id: impl Into<CanId>,
         bit_rate_switch: bool,
@@ -110,10 +109,10 @@ impl CanFrame {
         Ok(CanFrame::with(id.into(), format, payload))
     }
 
-    /// A frame of a format.
+    /// Creates a frame of the given format.
     ///
     /// # Errors
-    /// As [`CanFrame::new`] and [`CanFrame::fd`].
+    /// The same as those of [`CanFrame::new`] and [`CanFrame::fd`].
     pub fn of_format(
         id: impl Into<CanId>,
         format: FrameFormat,
@@ -125,7 +124,7 @@ impl CanFrame {
         }
     }
 
-    /// A classic frame whose payload length is checked at compile time.
+    /// Creates a classic frame; the compiler checks the payload length.
     pub const fn of<const N: usize>(id: CanId, payload: [u8; N]) -> CanFrame {
         const { assert!(N <= MAX_CLASSIC_BYTES) };
         let mut bytes = [0; MAX_FD_BYTES];
@@ -142,7 +141,7 @@ impl CanFrame {
         }
     }
 
-    /// The same id and payload as an FD frame; its payload is at most 8 bytes long if the frame is classic.
+    /// Returns an FD frame with the same id and payload.
     pub const fn to_fd(self, bit_rate_switch: bool) -> CanFrame {
         CanFrame {
             format: FrameFormat::Fd { bit_rate_switch },
@@ -196,7 +195,7 @@ impl CanFrame {
     }
 }
 
-/// Number of payload bytes of a data length code of an FD frame; codes above 15 count as 15.
+/// Returns the number of payload bytes of an FD frame from its data length code; a code above 15 is read as 15.
 pub(crate) const fn fd_length(dlc: u8) -> u8 {
     if dlc <= MAX_CLASSIC_BYTES as u8 {
         return dlc;

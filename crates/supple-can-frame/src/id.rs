@@ -3,25 +3,25 @@
 use core::cmp::Ordering;
 use core::fmt;
 
-/// Flag of an extended id, above its 29 bits.
+/// Bit of [`CanId`] that marks an extended id.
 const EXTENDED: u32 = 1 << 31;
 /// Largest ids.
 const MAX_STANDARD: u32 = 0x7ff;
 const MAX_EXTENDED: u32 = 0x1fff_ffff;
-/// Bits of an extended id below those that a standard id also has.
+/// Number of bits that an extended id has in addition to the 11 bits of a standard id.
 const EXTENSION_BITS: u32 = 18;
 
-/// Id of a frame. Ids are ordered as on the bus: the lowest wins the arbitration, and a standard id wins over an
-/// extended one that begins with it.
+/// Id of a frame. Ids are ordered by priority on the bus: the lowest id wins the arbitration, and a standard id wins over
+/// an extended id whose first 11 bits are equal to it.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 pub struct CanId(u32);
 
-/// A number that is too large for its kind of id.
+/// Error: the number is too large for this format of id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CanIdError {
-    /// A standard id above 0x7FF.
+    /// A standard id is at most 0x7FF.
     Standard(u32),
-    /// An extended id above 0x1FFF_FFFF.
+    /// An extended id is at most 0x1FFF_FFFF.
     Extended(u32),
 }
 
@@ -41,10 +41,10 @@ impl fmt::Display for CanIdError {
 impl core::error::Error for CanIdError {}
 
 impl CanId {
-    /// A standard id of 11 bits.
+    /// Creates a standard id of 11 bits.
     ///
     /// # Errors
-    /// A number above 0x7FF.
+    /// [`CanIdError::Standard`] for a number above 0x7FF.
     pub const fn standard(raw: u32) -> Result<CanId, CanIdError> {
         if raw > MAX_STANDARD {
             return Err(CanIdError::Standard(raw));
@@ -52,10 +52,10 @@ impl CanId {
         Ok(CanId(raw))
     }
 
-    /// An extended id of 29 bits.
+    /// Creates an extended id of 29 bits.
     ///
     /// # Errors
-    /// A number above 0x1FFF_FFFF.
+    /// [`CanIdError::Extended`] for a number above 0x1FFF_FFFF.
     pub const fn extended(raw: u32) -> Result<CanId, CanIdError> {
         if raw > MAX_EXTENDED {
             return Err(CanIdError::Extended(raw));
@@ -63,12 +63,12 @@ impl CanId {
         Ok(CanId(raw | EXTENDED))
     }
 
-    /// A standard id from the low 11 bits of a number; higher bits are ignored.
+    /// Creates a standard id from the low 11 bits of a number; ignores higher bits.
     pub const fn standard_masked(raw: u16) -> CanId {
         CanId(raw as u32 & MAX_STANDARD)
     }
 
-    /// The number without its kind, 0 to 0x7FF or 0 to 0x1FFF_FFFF.
+    /// Returns the id as a number, 0 to 0x7FF or 0 to 0x1FFF_FFFF.
     pub const fn raw(self) -> u32 {
         self.0 & !EXTENDED
     }
@@ -87,8 +87,8 @@ impl CanId {
         }
     }
 
-    /// The bits of the arbitration field after the start bit, as a number: a standard id is followed by two dominant
-    /// bits where an extended one has two recessive bits.
+    /// Returns the bits of the arbitration field after the start bit as a number. After the first 11 bits, a standard id has
+    /// two dominant bits and an extended id two recessive bits.
     const fn arbitration(self) -> u64 {
         let raw = self.raw() as u64;
         if self.is_extended() {
@@ -119,7 +119,7 @@ impl fmt::Debug for CanId {
     }
 }
 
-/// As in the tools of Linux: three hexadecimal digits, or eight for an extended id.
+/// Writes three hexadecimal digits, or eight for an extended id, as the CAN tools of Linux do.
 impl fmt::Display for CanId {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if self.is_extended() {

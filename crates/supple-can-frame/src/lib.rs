@@ -1,7 +1,7 @@
 //! Frames of classic CAN and CAN FD, and their durations on the bus.
 //!
-//! [`CanFrame`] holds any data frame of either format; [`timing`] counts its bits, exactly for its content or as bounds for
-//! its payload length, and [`BitRates`] gives their duration. This crate knows no vendor's protocol and accesses no bus.
+//! [`CanFrame`] holds any data frame of either format; [`timing`] counts its bits, exactly from its content or as bounds from
+//! its payload length, and [`BitRates`] converts them to a duration. This crate has no vendor's protocol and accesses no bus.
 //! Remote frames are not supported: no supported arm uses them.
 //!
 //! ```

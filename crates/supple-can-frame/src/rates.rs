@@ -33,7 +33,7 @@ impl BitRates {
         self.data_bit_per_s.is_some()
     }
 
-    /// The fastest format on this bus: FD with a bit rate switch if it has a data rate, else classic.
+    /// Returns the fastest format on this bus: FD with a bit rate switch if the bus has a data rate, otherwise classic.
     pub const fn fastest_format(&self) -> FrameFormat {
         if self.has_fd() {
             FrameFormat::Fd {
@@ -44,7 +44,7 @@ impl BitRates {
         }
     }
 
-    /// Duration of these bits \[ns\]; each phase is rounded up.
+    /// Returns the duration of these bits \[ns\]; the duration of each phase is rounded up.
     pub const fn bits_ns(&self, bits: Bits) -> u64 {
         let data_bit_per_s = match self.data_bit_per_s {
             Some(rate) => rate,

@@ -10,7 +10,7 @@
 
 use crate::frame::{CanFrame, FrameFormat, fd_length};
 
-/// Bits per second of a classic bus of an arm; a bit is a microsecond.
+/// Bit rate of an arm's classic CAN bus \[bit/s\]: one bit takes one microsecond.
 pub const BIT_RATE: u32 = 1_000_000;
 
 /// Bits that are never stuffed: delimiter of the checksum, acknowledgement and its delimiter, end of frame,
@@ -41,12 +41,12 @@ pub struct Bits {
     pub data: u32,
 }
 
-/// What determines the number of bits of a frame besides its contents.
+/// Properties of a frame that determine its number of bits, except its contents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FrameLayout {
     /// Format.
     pub format: FrameFormat,
-    /// The id has 29 bits.
+    /// Whether the id has 29 bits.
     pub extended: bool,
     /// Data length code, 0 to 8, or 0 to 15 for an FD frame.
     pub dlc: u8,
@@ -71,7 +71,7 @@ impl FrameLayout {
         }
     }
 
-    /// Bits without any stuffing that depends on the contents.
+    /// Returns the number of bits without stuff bits that depend on the contents.
     pub const fn min_bits(&self) -> Bits {
         match self.format {
             FrameFormat::Classic => Bits {
@@ -82,7 +82,7 @@ impl FrameLayout {
         }
     }
 
-    /// Bits with maximum stuffing.
+    /// Returns the number of bits with the maximum number of stuff bits.
     pub const fn max_bits(&self) -> Bits {
         match self.format {
             FrameFormat::Classic => {
@@ -101,7 +101,7 @@ impl FrameLayout {
         }
     }
 
-    /// Bits of a classic frame that are stuffed.
+    /// Returns the number of bits of a classic frame that are subject to bit stuffing.
     const fn classic_stuffed_bits(&self) -> u32 {
         let head = if self.extended {
             EXTENDED_HEAD_BITS
@@ -120,7 +120,7 @@ impl FrameLayout {
         }
     }
 
-    /// Bits after the bit rate switch that are stuffed.
+    /// Returns the number of bits after the bit rate switch that are subject to bit stuffing.
     const fn fd_payload_bits(&self) -> u32 {
         FD_CONTROL_BITS + 8 * fd_length(self.dlc) as u32
     }
@@ -146,7 +146,7 @@ impl FrameLayout {
 }
 
 impl Bits {
-    /// Bits of this frame, including stuffing and the interframe space.
+    /// Counts the bits of this frame, including stuff bits and the interframe space.
     pub fn of(frame: &CanFrame) -> Bits {
         let layout = FrameLayout::of(frame);
         let mut stream = Stream::default();
@@ -171,34 +171,34 @@ impl Bits {
                 // The error state indicator is dominant in the frame of an error-active node.
                 stream.push(u64::from(frame.dlc()), FD_CONTROL_BITS);
                 stream.push_payload(frame);
-                // A stuff bit after the payload is the first fixed one.
+                // The first fixed stuff bit takes the place of a stuff bit after the payload.
                 let data = stream.stuffing - nominal - u32::from(stream.ended_with_stuffing);
                 layout.fd_bits(bit_rate_switch, nominal, data)
             }
         }
     }
 
-    /// Number of bits at either rate.
+    /// Returns the number of bits at both rates together.
     pub const fn total(self) -> u32 {
         self.nominal + self.data
     }
 }
 
-/// Bits of a classic frame of `dlc` bytes with a standard id, without any stuffing.
+/// Returns the number of bits of a classic frame of `dlc` bytes with a standard id, without stuff bits.
 pub const fn min_bits(dlc: u8) -> u32 {
     FrameLayout::standard(FrameFormat::Classic, dlc)
         .min_bits()
         .nominal
 }
 
-/// Bits of a classic frame of `dlc` bytes with a standard id, with maximum stuffing.
+/// Returns the number of bits of a classic frame of `dlc` bytes with a standard id and the maximum number of stuff bits.
 pub const fn max_bits(dlc: u8) -> u32 {
     FrameLayout::standard(FrameFormat::Classic, dlc)
         .max_bits()
         .nominal
 }
 
-/// Bits of this frame at either rate, including stuffing and the interframe space.
+/// Returns the number of bits of this frame at both rates together, including stuff bits and the interframe space.
 pub fn bits(frame: &CanFrame) -> u32 {
     Bits::of(frame).total()
 }
@@ -268,7 +268,7 @@ impl Stream {
 mod tests {
     use super::Stream;
 
-    /// The published check value of CRC-15/CAN.
+    /// Compares with the published check value of CRC-15/CAN.
     #[test]
     fn checksum_matches_crc_15_can() {
         let mut stream = Stream::default();

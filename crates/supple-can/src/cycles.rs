@@ -1,4 +1,4 @@
-//! Opening the bus and running cycles, for every type of drives.
+//! Opens the bus and runs cycles, for every type of drives.
 
 use core::time::Duration;
 use supple_bus::virtual_time::LockstepBus;
@@ -6,16 +6,18 @@ use supple_bus::{Address, Bus, BusError, OwnerFolder, PacedBus, SocketCan};
 use supple_core::controller::NamesJoints;
 use supple_core::record::Text;
 use supple_drive::{
-    Counters, Drive, Drives, LoopError, LossReason, PlantLoop, Rest, SharedMemoryLink, Stage,
+    Counters, Drive, Drives, LoopError, LossReason, PlantLoop, SharedMemoryLink, Stage,
+    TorqueOffBehaviour,
 };
 use supple_realtime::{Stop, diagnostics, monotonic_ns, pause};
 
-/// Timeout for an emulated arm to appear \[ns\].
+/// Timeout of the search for an emulated arm \[ns\].
 const EMULATOR_TIMEOUT_NS: u64 = 5_000_000_000;
 /// Time without a reply from any motor after which start-up is repeated \[ns\].
 const ARM_LOST_AFTER_NS: u64 = 500_000_000;
-/// Maximum time for ending the torque at shutdown \[ns\]: of motors that brake, and of an arm that is laid down.
+/// Maximum time for ending the torque at shutdown if the motors brake without torque \[ns\].
 const BRAKE_TIMEOUT_NS: u64 = 250_000_000;
+/// Maximum time for laying the arm down and ending the torque at shutdown if it falls without torque \[ns\].
 const STOW_TIMEOUT_NS: u64 = 60_000_000_000;
 /// Interval between attempts to reach a lost arm, or an emulator that has not started yet.
 pub const SEARCH_INTERVAL: Duration = Duration::from_millis(200);
@@ -25,7 +27,7 @@ pub const SEARCH_INTERVAL: Duration = Duration::from_millis(200);
 pub enum Ended {
     /// A shutdown was requested, or all cycles are done; the motors are idle.
     ShutDown,
-    /// No motor replies any more.
+    /// No motor has replied for [`ARM_LOST_AFTER_NS`].
     ArmLost,
 }
 
@@ -40,7 +42,7 @@ pub fn run_until_shutdown<const N: usize, D: Drive<N>>(
     joint_names: &[Text],
 ) -> Result<Ended, LoopError> {
     let mut last_reply_ns = plant.drive().now_ns();
-    let mut stages = Stages::default();
+    let mut stages = StageReporter::default();
     let all_cycles_done = |done: u64| cycles.is_some_and(|max| done >= max);
     while !stop.shutdown_requested() && !all_cycles_done(plant.counters().cycles) {
         plant.run()?;
@@ -54,13 +56,13 @@ pub fn run_until_shutdown<const N: usize, D: Drive<N>>(
         stages.report(plant, joint_names);
     }
     plant.begin_shutdown();
-    let timeout_ns = match plant.drive().rest() {
-        Rest::Brakes => BRAKE_TIMEOUT_NS,
-        Rest::Falls => STOW_TIMEOUT_NS,
+    let timeout_ns = match plant.drive().torque_off_behaviour() {
+        TorqueOffBehaviour::Brakes => BRAKE_TIMEOUT_NS,
+        TorqueOffBehaviour::Falls => STOW_TIMEOUT_NS,
     };
     let until_ns = plant.drive().now_ns() + timeout_ns;
-    if plant.drive().rest() == Rest::Falls {
-        // Motors that are just being enabled are not active yet: this cycle ends that.
+    if plant.drive().torque_off_behaviour() == TorqueOffBehaviour::Falls {
+        // Motors that are being enabled are not active yet: this cycle ends their enabling.
         plant.run()?;
         stages.report(plant, joint_names);
     }
@@ -71,23 +73,23 @@ pub fn run_until_shutdown<const N: usize, D: Drive<N>>(
     Ok(Ended::ShutDown)
 }
 
-/// What was last reported.
-struct Stages {
+/// Posts the changes of the loss and of the stage of the safe action; holds those last posted.
+struct StageReporter {
     loss: Option<(LossReason, u64)>,
     stage: Stage,
 }
 
-impl Default for Stages {
-    fn default() -> Stages {
-        Stages {
+impl Default for StageReporter {
+    fn default() -> StageReporter {
+        StageReporter {
             loss: None,
             stage: Stage::Resting,
         }
     }
 }
 
-impl Stages {
-    /// Posts a message when the drives become active or idle, so not in a cycle of steady operation.
+impl StageReporter {
+    /// Posts a message if the loss or the stage has changed; posts nothing in steady operation.
     fn report<const N: usize, D: Drive<N>>(
         &mut self,
         plant: &PlantLoop<N, D, SharedMemoryLink>,
@@ -95,7 +97,7 @@ impl Stages {
     ) {
         let in_words = |reason: &LossReason| reason.with_names(joint_names).to_string();
         let guard = plant.guard();
-        let falls = plant.drive().rest() == Rest::Falls;
+        let falls = plant.drive().torque_off_behaviour() == TorqueOffBehaviour::Falls;
         if guard.last_loss() != self.loss {
             self.loss = guard.last_loss();
             if let (Some((reason, _)), false) = (self.loss, falls) {
@@ -164,7 +166,7 @@ pub fn open(address: Address, virtual_time: bool, stop: &Stop) -> Result<Box<dyn
     }
 }
 
-/// Adds the counts of two runs; timing and load are those of the later run `b`.
+/// Adds the counters of two runs; takes timing and bus load from the later run `b`.
 pub fn sum_counters(a: &Counters, b: &Counters) -> Counters {
     Counters {
         cycles: a.cycles + b.cycles,

@@ -9,11 +9,12 @@ use std::path::Path;
 use std::sync::Mutex;
 use supple_model::{Description, Paths, UrdfName, assets};
 
-/// Warnings that were already printed.
+/// Warnings that have been printed.
 static PRINTED_WARNINGS: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 
-/// Loads a built-in arm by name, or an arm from a file. A built-in name takes precedence; write `./wam4` for a path. What a
-/// controller needs and the arm's TOML leaves out is derived. Unread URDF content is reported on standard error, or is an error if `strict` is set.
+/// Loads a built-in arm by name, or an arm from a file. A built-in name takes precedence; write `./wam4` for a path. Settings
+/// that a controller needs and that the arm's TOML lacks are derived. URDF content that supple does not read causes a warning on
+/// standard error, or an error if `strict` is set.
 ///
 /// # Errors
 /// [`Failure::UnknownArm`] or [`Failure::Model`].
@@ -38,8 +39,8 @@ pub fn find(name_or_path: &str, strict: bool) -> Result<Description, Failure> {
     })
 }
 
-/// The arm's name for a process in another folder: that of a built-in arm, or the absolute path of another one, with the tip
-/// of a URDF.
+/// Returns the name of an arm for a process in another folder: the name of a built-in arm, or the absolute path of another arm
+/// with the tip of its URDF.
 pub fn absolute(name_or_path: &str) -> String {
     let path = |path: &str| match Path::new(path).canonicalize() {
         Ok(path) => path.display().to_string(),
@@ -57,7 +58,7 @@ pub fn absolute(name_or_path: &str) -> String {
     }
 }
 
-/// Loads an arm from a file. Warnings as for [`find`].
+/// Loads an arm from a file; prints warnings as [`find`] does.
 ///
 /// # Errors
 /// [`Failure::Model`].
@@ -67,7 +68,7 @@ pub fn load(path: &Path, strict: bool) -> Result<Description, Failure> {
     completed(description)
 }
 
-/// The arm with all that its TOML leaves out, which is reported on standard error.
+/// Derives the settings that the arm's TOML lacks, and reports their number on standard error.
 fn completed(description: Description) -> Result<Description, Failure> {
     let completed = description.completed()?;
     let estimates = completed.derived.iter();
@@ -107,7 +108,7 @@ fn print_warnings(description: &Description) {
     }
 }
 
-/// A command may load an arm more than once.
+/// Prints a line unless it has been printed: a command may load an arm more than once.
 fn print_once(line: &str) {
     let mut printed = PRINTED_WARNINGS
         .lock()

@@ -23,12 +23,12 @@ pub fn print_line(text: &str) -> Result<(), Failure> {
 /// Writes a value as JSON to standard output.
 ///
 /// # Errors
-/// As [`print_line`].
+/// The same as those of [`print_line`].
 pub fn print_json(value: &impl Serialize) -> Result<(), Failure> {
     print_line(&json(value)?)
 }
 
-/// A value as JSON.
+/// Converts a value to JSON.
 ///
 /// # Errors
 /// [`Failure::ReportGeneration`] if the value cannot be represented as JSON.
@@ -40,8 +40,8 @@ pub fn json(value: &impl Serialize) -> Result<String, Failure> {
 /// Whether a background thread writes standard error.
 static IN_BACKGROUND: AtomicBool = AtomicBool::new(false);
 
-/// From this call on a background thread writes standard error, so that a process that supervises an arm never blocks
-/// on it.
+/// Makes a background thread write all further output to standard error, so that a process that supervises an arm never
+/// blocks on it.
 pub fn write_stderr_in_background() {
     diagnostics::start();
     IN_BACKGROUND.store(true, Ordering::Relaxed);
@@ -59,8 +59,8 @@ pub fn print_status(text: &str) {
     print_status_part(format!("{text}\n"));
 }
 
-/// Asks a question on the terminal; false without one, or for any answer but `y` and `yes`.
-pub fn confirms(question: &str) -> bool {
+/// Asks a question on the terminal; returns false without a terminal, or for any answer except `y` and `yes`.
+pub fn confirm(question: &str) -> bool {
     if !std::io::stdin().is_terminal() {
         return false;
     }
@@ -70,7 +70,7 @@ pub fn confirms(question: &str) -> bool {
     read.is_ok() && matches!(answer.trim(), "y" | "Y" | "yes")
 }
 
-/// As [`print_status`], for text that is not a complete line.
+/// Writes text that is not a complete line to standard error; otherwise as [`print_status`].
 pub fn print_status_part(text: String) {
     match IN_BACKGROUND.load(Ordering::Relaxed) {
         true => diagnostics::post_part(text),
@@ -80,7 +80,7 @@ pub fn print_status_part(text: String) {
     }
 }
 
-/// A failure as `--json` prints it.
+/// A failure in the form that `--json` prints.
 #[derive(Serialize)]
 struct JsonFailure {
     error: JsonError,
@@ -93,11 +93,11 @@ struct JsonError {
     message: String,
 }
 
-/// Longest message, and what is kept of a longer one from its beginning and its end \[characters\].
+/// Maximum length of a message; of a longer message the beginning and the end are kept \[characters\].
 const MESSAGE_CHARACTERS: usize = 4000;
 const KEPT_CHARACTERS: (usize, usize) = (2000, 500);
 
-/// A message without the middle of one that quotes a long file: its beginning and its end are kept.
+/// Shortens a long message, for example one that quotes a file, to its beginning and its end.
 fn shortened(message: String) -> String {
     let characters = message.chars().count();
     if characters <= MESSAGE_CHARACTERS {

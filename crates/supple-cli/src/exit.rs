@@ -44,10 +44,10 @@ pub const CODES: &str = "Exit codes:
   12   a test case of `supple drill` failed
   130  interrupted";
 
-/// Why a command failed. Each message is one line that names the cause and the remedy.
+/// Error of a command. Each message is one line with the cause and the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum Failure {
-    /// Neither a built-in arm nor a file.
+    /// The name is neither a built-in arm nor a file.
     #[error(
         "`{found}` is neither a built-in arm nor an existing file; give one of {known}, or the path of an \
          arm's TOML or of its folder"
@@ -58,13 +58,13 @@ pub enum Failure {
         /// Names of the built-in arms.
         known: String,
     },
-    /// An invalid arm description.
+    /// The arm description is invalid.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// An experiment that could not be run.
+    /// An experiment could not be run.
     #[error(transparent)]
     Experiment(#[from] ExperimentError),
-    /// A calibration that ended early.
+    /// A calibration ended early.
     #[error(transparent)]
     Procedure(#[from] ProcedureError),
     /// The command needs the program `supple`.
@@ -73,16 +73,16 @@ pub enum Failure {
         /// The option.
         option: &'static str,
     },
-    /// Processes in virtual time cannot do this with this plant.
+    /// Loading another model in virtual time is not supported with this plant.
     #[error("--virtual-time loads models with the plant `emu` only: use that, or leave it out")]
     VirtualTimeNeedsEmu,
     /// The operator or a signal interrupted a calibration, whose logs are complete.
-    #[error("interrupted; all logs are complete, go on with --resume")]
+    #[error("interrupted; all logs are complete, continue with --resume")]
     Interrupted,
-    /// Somebody requested another mode during a calibration, whose logs are complete.
+    /// Another operator requested a mode during a calibration, whose logs are complete.
     #[error(
-        "somebody else requested mode {mode}: the calibration ends and requests nothing more; all logs are complete, go on \
-         with --resume"
+        "another operator requested mode {mode}: the calibration has ended and sends no further requests; all logs are complete, \
+         continue with --resume"
     )]
     OtherMode {
         /// Name of the mode.
@@ -91,13 +91,13 @@ pub enum Failure {
     /// The drives did not become active.
     #[error(
         "the drives did not become active: release the emergency stop, press Shift-Idle and then Shift-Activate on the \
-         pendant, and go on with --resume"
+         pendant, and continue with --resume"
     )]
     DrivesNotActive,
     /// The running system needs another model.
     #[error(
         "the controller of the running system needs the model of {}: stop the system, start it again with \
-         `--arm {}`, and go on with --resume",
+         `--arm {}`, and continue with --resume",
         folder.display(), folder.display()
     )]
     OtherModelNeeded {
@@ -120,7 +120,7 @@ pub enum Failure {
     },
     /// The request was accepted, but the system has a latched fault.
     #[error(
-        "a fault is latched, which `supple status` shows: remove the cause, then clear it with `supple reset`"
+        "a fault is latched (see `supple status`): remove its cause, then clear it with `supple reset`"
     )]
     SystemInFault,
     /// The log ended before the end of the run.
@@ -137,8 +137,8 @@ pub enum Failure {
         /// The process that writes the trace.
         name: &'static str,
     },
-    /// Shared memory of a running system, or the address of its bus. Boxed: a program that runs no system links
-    /// neither.
+    /// Shared memory of a running system, or the address of its bus. The error is
+    /// boxed, so that a program that runs no system does not link them.
     #[error(transparent)]
     System(Box<dyn std::error::Error + Send + Sync>),
     /// The pendant of an emulated arm does not answer.
@@ -152,15 +152,15 @@ pub enum Failure {
         /// Error of the operating system, or the reply.
         cause: String,
     },
-    /// Nobody waits for `supple at-home`.
+    /// No arm waits for `supple at-home`.
     #[error(
-        "no arm asks for its home pose: this is needed only after an emergency stop, once the power is back (release the button, \
-         press Shift-Idle); if the stop was pressed again, repeat that and confirm again"
+        "no arm asks for its home pose: this is needed only after an emergency stop, after the power has returned (release the button, \
+         press Shift-Idle); if the stop was pressed again, repeat these steps and confirm again"
     )]
     NoArmWaits,
     /// The home pose was not confirmed.
     #[error(
-        "the home pose was not confirmed: nothing was changed; on a terminal answer y, elsewhere give --yes"
+        "the home pose was not confirmed and no position was changed: answer y on a terminal, or give --yes"
     )]
     NotConfirmed,
     /// Virtual time was requested for a real CAN bus.
@@ -177,7 +177,7 @@ pub enum Failure {
         /// PID of its `supple up`.
         process: i32,
     },
-    /// A program that must be installed beside this one is missing.
+    /// A program that must be installed in the same folder is missing.
     #[error(
         "{} is missing: build it with `cargo build --release -p {name}`, or install it beside this \
          program", program.display()
@@ -211,14 +211,14 @@ pub enum Failure {
         /// Patterns given by the user.
         patterns: String,
     },
-    /// An injected fault that this plant does not support.
+    /// The plant does not support an injected fault.
     #[error("--inject: {0}")]
     Injection(#[from] InjectionError),
     /// A file of plant options is invalid.
     #[error(transparent)]
     PlantOptions(#[from] PlantOptionsError),
     /// No effect matches the given texts.
-    #[error("no effect of `supple effects` contains {text}: leave out --only to see all names")]
+    #[error("no effect of `supple effects` contains {text}: omit --only to see all names")]
     NoSuchEffect {
         /// Texts given by the user.
         text: String,
@@ -255,10 +255,10 @@ pub enum Failure {
         /// The option.
         option: &'static str,
     },
-    /// The hand of an emulated arm waits for a mode that it is never notified of.
+    /// The hand of an emulated arm waits for a mode, but the emulator does not know the mode of the controller.
     #[error(
-        "the hand of an emulated arm does not learn when float begins: write `when = \"active\"` in its [hand] of the plant \
-         options, or use --plant sim"
+        "an emulated arm does not know when float begins: set `when = \"active\"` in [hand] of the plant options, or use \
+         --plant sim"
     )]
     HandNeedsMode,
     /// The system under test did not reach tracking mode.
@@ -267,7 +267,7 @@ pub enum Failure {
          processes above, or run `supple doctor`"
     )]
     DidNotReachTracking,
-    /// Test cases whose result differs from the expected one.
+    /// The result of some test cases differs from the expected result.
     #[error("unexpected results: {rows}; see the table above")]
     Drill {
         /// Names of the test cases.
@@ -284,34 +284,34 @@ pub enum Failure {
     },
     /// The plant holds an arm without brakes and lays it down.
     #[error(
-        "the arm is being held and laid down, which gravity hold does not end: wait until `supple status` says `drives idle`, \
+        "the arm is being held and laid down, which gravity hold does not end: wait until `supple status` shows `drives idle`, \
          then `supple reset` after a fault, `supple mode idle`, `supple mode gravity-hold`"
     )]
     ArmIsLaidDown,
-    /// The process of the controller is there, but it does not answer.
+    /// The process of the controller runs but does not answer.
     #[error(
-        "the controller under the prefix `{prefix}` runs but does not answer: it was stopped, or hangs. Its plant sets the \
-         drives to idle 10 ms after the last answer: motors brake, an arm without brakes is laid down. If the arm moves, \
+        "the controller under the prefix `{prefix}` runs but does not answer: the process is stopped or hangs. The plant \
+         sets the drives to idle 10 ms after the last answer: motors brake, an arm without brakes is laid down. If the arm moves, \
          press the emergency stop; end the system with `supple stop`"
     )]
     ControllerHangs {
         /// The prefix.
         prefix: String,
     },
-    /// Learned terms are to be saved, but there are none.
+    /// No learned terms exist that could be saved.
     #[error(
         "nothing is learned yet: begin with `supple learning on`, let the arm move freely for some seconds, and save \
          again"
     )]
     NothingLearned,
-    /// An option with the wrong number of values.
+    /// An option has the wrong number of values.
     #[error("{option} has {found} values: give {expected}")]
     ValueCount {
         /// The option.
         option: &'static str,
-        /// Values given by the user.
+        /// Number of values given by the user.
         found: usize,
-        /// Counts that it takes, in words.
+        /// Valid numbers of values, as text.
         expected: String,
     },
     /// The controller refused the request.
@@ -323,29 +323,29 @@ pub enum Failure {
     /// A file of a motion is invalid, or cannot be written.
     #[error(transparent)]
     Points(Box<PointsError>),
-    /// A motion that cannot be repeated, or was not.
+    /// A motion cannot be repeated, or was not repeated.
     #[error("{}: {reason}; change the file, or teach another motion", file.display())]
     Motion {
-        /// Its file.
+        /// File of the motion.
         file: PathBuf,
         /// The reason.
         reason: String,
     },
-    /// The arm was not guided.
+    /// The arm was not guided during a recording.
     #[error(
-        "the arm rested during the whole recording, nothing is written: guide it by hand while it floats"
+        "the arm stood still during the whole recording, no file was written: guide it by hand in float"
     )]
     NothingTaught,
     /// The running system has another arm.
     #[error(
-        "the arm {arm} has {joints} joints, that of the running system {running}: name its arm with --arm {named}"
+        "the arm {arm} has {joints} joints, the arm of the running system has {running}: give that arm with --arm {named}"
     )]
     OtherArm {
         /// Name of the given arm.
         arm: String,
-        /// Its joints.
+        /// Number of its joints.
         joints: usize,
-        /// Joints of the running system.
+        /// Number of joints of the running system.
         running: usize,
         /// Name of its arm, if it is known.
         named: String,
@@ -353,7 +353,7 @@ pub enum Failure {
     /// A log cannot be read or written.
     #[error(transparent)]
     Log(#[from] LogError),
-    /// The log has not its own name yet.
+    /// The log still has the temporary name of an incomplete log.
     #[error(
         "cannot read {}: it does not exist; its writer was killed or still writes {part}: read that file, or `supple log recover \
          {part}`", log.display(), part = part.display()
@@ -361,7 +361,7 @@ pub enum Failure {
     UnfinishedLog {
         /// The log.
         log: PathBuf,
-        /// What is written of it.
+        /// The incomplete log.
         part: PathBuf,
     },
     /// A replay differs from the logged run.
@@ -373,15 +373,15 @@ pub enum Failure {
     ReplayMismatch {
         /// The log.
         path: PathBuf,
-        /// Steps that differ.
+        /// Number of steps that differ.
         different: u64,
-        /// All steps.
+        /// Number of all steps.
         steps: u64,
     },
-    /// Motors that do not answer, do not fit the arm's description, or refuse a register.
+    /// A motor does not answer, does not match the arm's description, or refuses a register write.
     #[error("{problem}")]
     Motors {
-        /// What is wrong, with its remedy.
+        /// Problem and remedy.
         problem: String,
     },
     /// The machine does not meet the real-time requirements.
@@ -419,7 +419,7 @@ pub enum Failure {
     },
     /// Two outputs of a run have the same name.
     #[error(
-        "--trace {} is the file of --log {}: the log would replace the trace; give them two names", trace.display(),
+        "--trace {} is the file of --log {}: the log would replace the trace; give them different names", trace.display(),
         log.display()
     )]
     SameOutput {
@@ -448,13 +448,13 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// The error for a result that standard output does not take.
+    /// Creates the failure for a result that cannot be written to standard output.
     pub fn standard_output(error: std::io::Error) -> Failure {
         Failure::File {
             action: "write",
             path: PathBuf::from("standard output"),
             error,
-            remedy: "redirect it to a file or pipe with room",
+            remedy: "redirect it to a file on a disk with free space, or to a pipe that is read",
         }
     }
 
@@ -463,7 +463,7 @@ impl Failure {
         use std::io::ErrorKind;
         let remedy = match error.kind() {
             ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
-                "make room, or choose another folder with --out"
+                "free disk space, or choose another folder with --out"
             }
             ErrorKind::InvalidInput | ErrorKind::IsADirectory => {
                 "name a regular file or a new file in an existing folder"
@@ -484,7 +484,7 @@ impl Failure {
         Failure::System(Box::new(error))
     }
 
-    /// Short name of the error, as `--json` prints it.
+    /// Returns the short name of the error that `--json` prints.
     pub fn kind(&self) -> &'static str {
         match self.code() {
             2 => "usage",
@@ -503,7 +503,7 @@ impl Failure {
         }
     }
 
-    /// Whether the results, which include the error, are already on standard output.
+    /// Whether the results, which include the error, have been printed to standard output.
     pub fn comes_with_results(&self) -> bool {
         matches!(
             self,
@@ -584,7 +584,7 @@ fn procedure_code(error: &ProcedureError) -> u8 {
     }
 }
 
-/// Errors caused by the arm description get the code of the description.
+/// Returns the exit code; errors caused by the arm description get the code of the description.
 fn experiment_code(error: &ExperimentError) -> u8 {
     match error {
         ExperimentError::Model(_)
@@ -650,10 +650,10 @@ mod tests {
     use std::io::ErrorKind;
     use supple_plant::PlantOptions;
 
-    /// Rows of the table without a [`Failure`]: success, wrong use as clap has it, interrupted.
+    /// Codes of the table that no [`Failure`] has: success, command-line errors of clap, interrupted.
     const ELSEWHERE: [u8; 3] = [0, 2, 130];
 
-    /// Rows of the table in `--help`: code and meaning.
+    /// Parses the table of `--help` into codes and meanings.
     fn rows() -> Vec<(u8, &'static str)> {
         let rows = CODES.lines().skip(1).map(|line| {
             let (code, meaning) = line.trim().split_once(' ').expect("a code and its meaning");
@@ -666,7 +666,7 @@ mod tests {
         ErrorKind::StorageFull.into()
     }
 
-    /// A failure of each kind, with a part of the meaning of its row.
+    /// Returns a failure of each kind, with a part of the meaning of its code.
     fn failures() -> Vec<(Failure, &'static str)> {
         let text = String::new;
         let path = || PathBuf::from("file");
@@ -848,9 +848,9 @@ mod tests {
         assert_eq!(stated.len(), rows.len(), "a code has one row");
     }
 
-    /// Compares the table of the module documentation with that of `--help`.
+    /// Compares the table of the module documentation with the table of `--help`.
     #[test]
-    fn the_module_documents_the_same_codes_as_help() {
+    fn module_documentation_and_help_have_the_same_codes() {
         let source = include_str!("exit.rs");
         let documented: Vec<(u8, &str)> = source
             .lines()

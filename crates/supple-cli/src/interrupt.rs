@@ -10,7 +10,7 @@ use supple_realtime::Stop;
 /// Exit code after an interrupt, as shells define it.
 const INTERRUPTED: i32 = 130;
 
-/// The folder that is being written.
+/// Folder of the results that are being written.
 static PARTIAL: Mutex<Option<PathBuf>> = Mutex::new(None);
 
 /// Shutdown request, if a caller handles interrupts itself.
@@ -19,7 +19,7 @@ static SHUTDOWN_REQUEST: OnceLock<Stop> = OnceLock::new();
 /// Child process to which interrupts are forwarded immediately.
 static FORWARD_SIGNAL_TO: Mutex<Option<OwnedFd>> = Mutex::new(None);
 
-/// From this call on an interrupt is also forwarded to this child, before the ordered shutdown reaches it.
+/// Makes every further interrupt also end this child at once, before the ordered shutdown reaches the child.
 pub fn forward_interrupts_to(child: &Child) {
     let process = i32::try_from(child.id()).ok().and_then(Pid::from_raw);
     // A pidfd refers to this exact process even if its PID is reused. Without a pidfd, the child is terminated during
@@ -40,7 +40,7 @@ fn forward_interrupt() {
     }
 }
 
-/// From this call on an interrupt only sets the returned shutdown request; the caller shuts down.
+/// Makes every further interrupt only set the returned shutdown request; the caller shuts down.
 pub fn shutdown_on_interrupt() -> Stop {
     SHUTDOWN_REQUEST.get_or_init(Stop::default).clone()
 }

@@ -1,8 +1,8 @@
-//! What the two command-line programs share: the arguments of commands that need no running system, exit codes,
+//! Modules shared by the two command-line programs: arguments of commands that need no running system, exit codes,
 //! terminal output, interrupts, arms by name, logs, folders of results.
 //!
-//! `supple-report` is the program of the commands that draw; `supple` is the operator's. This crate draws nothing and
-//! reaches no running system, so that neither program links what only the other one needs.
+//! `supple-report` has the commands that draw figures; `supple` is the program of the operator. This crate draws no figures
+//! and accesses no running system, so that neither program links libraries that only the other one needs.
 
 #![forbid(unsafe_code)]
 

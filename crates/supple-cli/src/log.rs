@@ -11,14 +11,14 @@ use std::path::{Path, PathBuf};
 use supple_files::{check_output, create_output, with_suffix};
 use supple_log::{LogError, export_csv, info, recover, refuse_overwriting, replay};
 
-/// File extension of a log that is being written, or whose writer died.
+/// File extension of a log that is being written, or whose writer was killed.
 const PART: &str = "part";
-/// The same with the dot.
+/// [`PART`] with the dot.
 const PART_SUFFIX: &str = ".part";
 
-/// What `log export --json` prints.
+/// Output of `log export --json`.
 #[derive(Serialize)]
-struct Exported<'a> {
+struct ExportResult<'a> {
     file: &'a Path,
     channel: &'a str,
     rows: u64,
@@ -50,7 +50,7 @@ pub fn run(command: &LogDataCommand) -> Result<(), Failure> {
         } => {
             let rows = export_to_file(file, channel, *every, out)?;
             match json {
-                true => print_json(&Exported {
+                true => print_json(&ExportResult {
                     file: out,
                     channel,
                     rows,
@@ -96,7 +96,7 @@ fn read<T>(file: &Path, reader: impl Fn(&Path) -> Result<T, LogError>) -> Result
     reader(file).map_err(|error| failure(file, error))
 }
 
-/// Where a log is missing because its writer was killed, the error names the part that is there.
+/// Converts the error of a log. If the log is missing but its incomplete file exists, the error names that file.
 fn failure(file: &Path, error: LogError) -> Failure {
     let part = with_suffix(file, PART_SUFFIX);
     if file.exists() || !part.exists() {
@@ -147,7 +147,7 @@ fn export_to_file(
     })
 }
 
-/// Name of the recovered log: `run.mcap` and `run.mcap.part` become `run.recovered.mcap`.
+/// Returns the name of the recovered log: `run.mcap` and `run.mcap.part` become `run.recovered.mcap`.
 fn recovered_name(from: &Path) -> PathBuf {
     let named = match from.extension() {
         Some(ending) if ending == PART => from.with_extension(""),

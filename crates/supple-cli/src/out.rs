@@ -3,8 +3,8 @@
 //! Files are written to a hidden folder beside the target, on the same file system. When all files are complete, they
 //! are synced to disk and moved: the whole folder if the target does not exist, otherwise file by file, each
 //! atomically replacing a file of the same name. Other files in the folder are kept. A run that fails or is
-//! interrupted leaves no file. If a device, a FIFO, a socket or a folder has the name of a result, nothing is run and
-//! nothing is written.
+//! interrupted leaves no file. If a device, a FIFO, a socket or a folder has the name of a result, the run does not start
+//! and no file is written.
 
 use crate::exit::Failure;
 use crate::interrupt;
@@ -13,10 +13,10 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use supple_files::{check_output, create_output};
 
-/// Moved last: its presence marks the results as complete.
+/// File that is moved last; its presence marks the results as complete.
 const LAST: &str = "summary.json";
 
-/// Results that are not published yet.
+/// Results that have not been moved to the target folder.
 #[derive(Debug)]
 pub struct Staging {
     target: PathBuf,
@@ -51,7 +51,7 @@ impl Staging {
         })
     }
 
-    /// Creates a folder among the results.
+    /// Creates a folder in the results.
     ///
     /// # Errors
     /// [`Failure::File`].
@@ -62,7 +62,7 @@ impl Staging {
         Ok(folder)
     }
 
-    /// Writes a complete file among the results.
+    /// Writes a complete file to the results.
     ///
     /// # Errors
     /// [`Failure::File`].
@@ -117,13 +117,13 @@ fn reject_special_file(target: &Path) -> Result<(), Failure> {
 
 impl Drop for Staging {
     fn drop(&mut self) {
-        // Already gone if the folder was moved as a whole; otherwise remove the leftovers.
+        // The folder does not exist any more if it was moved as a whole; otherwise its remaining files are removed.
         let _ = fs::remove_dir_all(&self.partial);
         interrupt::set_partial_folder(None);
     }
 }
 
-/// Every file below a folder, relative to it.
+/// Lists every file below a folder, relative to the folder.
 fn files_in(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     let mut open = vec![PathBuf::new()];
@@ -153,7 +153,7 @@ mod tests {
     }
 
     fn staged(target: &Path) -> Staging {
-        let staging = Staging::new(target, &[]).expect("it can be written");
+        let staging = Staging::new(target, &[]).expect("the folder can be written");
         staging.folder("figures").expect("a folder");
         for name in ["figures/a.svg", "report.html", LAST] {
             staging.write(name, b"complete").expect("written");
@@ -169,7 +169,11 @@ mod tests {
         assert!(!target.exists());
         staging.publish().expect("published");
         assert_eq!(names(&target), ["figures/a.svg", "report.html", LAST]);
-        assert_eq!(names(folder.path()).len(), 3, "nothing beside it");
+        assert_eq!(
+            names(folder.path()).len(),
+            3,
+            "no other file is in the folder"
+        );
     }
 
     #[test]
@@ -204,7 +208,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let fifo = folder.path().join(LAST);
         let made = std::process::Command::new("mkfifo").arg(&fifo).status();
-        assert!(made.expect("mkfifo is there").success());
+        assert!(made.expect("mkfifo exists").success());
         let failure = Staging::new(folder.path(), &[LAST]).expect_err("refused");
         let later = staged(folder.path()).publish().expect_err("refused");
         for failure in [failure, later] {

@@ -9,7 +9,7 @@ pub fn parse<P: Parser>() -> P {
     P::from_arg_matches(&matches).unwrap_or_else(|error| error.exit())
 }
 
-/// The command, with negative numbers as values of every option that takes one.
+/// Makes every option with a value also accept negative numbers.
 pub fn with_negative_numbers(command: Command) -> Command {
     command
         .mut_args(|argument| match argument.get_action() {

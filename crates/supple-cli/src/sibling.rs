@@ -1,9 +1,9 @@
-//! Other programs that are installed in the same folder.
+//! Paths of other programs that are installed in the same folder.
 
 use crate::exit::Failure;
 use std::path::{Path, PathBuf};
 
-/// Path of a program beside this one.
+/// Returns the path of a program in the folder of this program.
 ///
 /// # Errors
 /// [`Failure::MissingProgram`]; [`Failure::File`] if the path of this program is unknown.
@@ -17,7 +17,7 @@ pub fn program_beside(name: &'static str) -> Result<PathBuf, Failure> {
     }
 }
 
-/// The Python interpreter: that of the environment in which this program is installed, else the one in PATH.
+/// Returns the Python interpreter of the environment in which this program is installed, otherwise the one in PATH.
 pub fn python() -> PathBuf {
     const NAME: &str = "python3";
     let beside = std::env::current_exe().map(|this| this.with_file_name(NAME));

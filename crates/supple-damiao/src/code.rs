@@ -1,15 +1,15 @@
-//! Linear codes: numbers of a closed interval as unsigned integers of 12 or 16 bits.
+//! Linear codes, which represent numbers of a closed interval as unsigned integers of 12 or 16 bits.
 //!
 //! ```text
 //! code = round((x - min) / (max - min) (2^bits - 1))      x = code / (2^bits - 1) (max - min) + min
 //! ```
 //!
 //! Public drivers round down, which biases every torque by half a step and changes 8 to 18 % of all codes in a round
-//! trip. Here the nearest code is taken: the error is at most half a step and every code survives a round trip.
+//! trip. This crate uses the nearest code: the error is at most half a step, and every code survives a round trip.
 
 use core::fmt;
 
-/// An interval and a number of bits.
+/// Linear code of an interval with a number of bits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinearCode {
     min: f64,
@@ -17,7 +17,7 @@ pub struct LinearCode {
     max_code: u16,
 }
 
-/// A value that is not a number has no code.
+/// Error: the value is not a finite number and has no code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NotANumber {
     /// The quantity.
@@ -33,7 +33,7 @@ impl fmt::Display for NotANumber {
 impl core::error::Error for NotANumber {}
 
 impl LinearCode {
-    /// The code of `min..=max` in `bits` bits, 1 to 16. The caller has checked that `min < max`, both finite.
+    /// Creates the code of `min..=max` with 1 to 16 bits. The caller has checked that both ends are finite and `min < max`.
     pub(crate) const fn new(min: f64, max: f64, bits: u32) -> LinearCode {
         LinearCode {
             min,
@@ -42,7 +42,7 @@ impl LinearCode {
         }
     }
 
-    /// The nearest code; values beyond the interval have the code of its end.
+    /// Returns the nearest code; a value outside the interval gets the code of the nearer end.
     ///
     /// # Errors
     /// [`NotANumber`] for a value that is not finite.
@@ -52,11 +52,11 @@ impl LinearCode {
         }
         let value = value.clamp(self.min, self.max);
         let fraction = (value - self.min) / (self.max - self.min);
-        // Not negative: the cast rounds down.
+        // The value is not negative, so the cast rounds down.
         Ok((fraction * f64::from(self.max_code) + 0.5) as u16)
     }
 
-    /// Value of a code; bits above the code's own are ignored.
+    /// Returns the value of a code; ignores bits above those of the code.
     pub fn decode(&self, code: u16) -> f64 {
         let code = f64::from(code & self.max_code);
         code / f64::from(self.max_code) * (self.max - self.min) + self.min

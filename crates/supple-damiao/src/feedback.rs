@@ -1,11 +1,11 @@
-//! Feedback: a motor's answer to a command, a special frame or a request for feedback.
+//! Feedback: the answer of a motor to a command, a special frame or a feedback request.
 
 use crate::frame::Frame;
 use crate::ranges::Ranges;
 use crate::status::Status;
 use core::fmt;
 
-/// State of a motor as codes; [`Ranges`] turn them into units.
+/// State of a motor, as codes; [`Ranges`] convert them to SI units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Feedback {
     /// Whether the motor has torque.
@@ -14,22 +14,22 @@ pub struct Feedback {
     pub motor: u8,
     /// Position, 16 bits.
     pub position: u16,
-    /// Velocity as the motor filtered it, 12 bits.
+    /// Velocity, filtered by the motor, 12 bits.
     pub velocity: u16,
-    /// Torque from the current, 12 bits: without friction and rotor inertia.
+    /// Torque computed from the motor current, 12 bits; includes neither friction nor rotor inertia.
     pub torque: u16,
-    /// Temperature of the amplifier \[degrees Celsius\]; 0 until it is known.
+    /// Temperature of the amplifier \[degrees Celsius\]; 0 until the motor has measured it.
     pub mosfet_celsius: u8,
-    /// Temperature of the winding \[degrees Celsius\]; 0 until it is known.
+    /// Temperature of the winding \[degrees Celsius\]; 0 until the motor has measured it.
     pub winding_celsius: u8,
 }
 
-/// A frame that is no feedback of the expected motor.
+/// Error: the frame is not feedback of the expected motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FeedbackError {
-    /// Not eight bytes.
+    /// The payload has this many bytes instead of eight.
     Length(usize),
-    /// Another motor's number in the first byte.
+    /// The first byte has the number of another motor.
     Motor {
         /// Found.
         found: u8,
@@ -55,10 +55,10 @@ impl fmt::Display for FeedbackError {
 impl core::error::Error for FeedbackError {}
 
 impl Feedback {
-    /// Parses a frame that answers something other than a register request. Its arbitration id is the caller's to check.
+    /// Parses a frame that does not answer a register request. The caller checks the arbitration id.
     ///
     /// # Errors
-    /// [`FeedbackError::Length`].
+    /// [`FeedbackError::Length`] if the payload does not have eight bytes.
     pub fn parse(frame: &Frame) -> Result<Feedback, FeedbackError> {
         let Some(bytes) = frame.eight() else {
             return Err(FeedbackError::Length(frame.payload().len()));
@@ -75,10 +75,10 @@ impl Feedback {
         })
     }
 
-    /// As [`Feedback::parse`], from the motor with `id` only.
+    /// Parses as [`Feedback::parse`] does, and accepts only feedback of the motor with `id`.
     ///
     /// # Errors
-    /// [`FeedbackError`].
+    /// [`FeedbackError`] for a frame of another motor or length.
     pub fn of_motor(frame: &Frame, id: u8) -> Result<Feedback, FeedbackError> {
         let feedback = Feedback::parse(frame)?;
         let (found, expected) = (feedback.motor, id & 0xF);
@@ -88,7 +88,7 @@ impl Feedback {
         }
     }
 
-    /// The frame of a motor that replies with `reply_id`. Bits beyond each field are dropped.
+    /// Encodes the frame of a motor that replies with `reply_id`. Bits that exceed a field are dropped.
     pub fn emit(&self, reply_id: u16) -> Frame {
         let [p1, p0] = self.position.to_be_bytes();
         let [v, t] = [self.velocity & 0xFFF, self.torque & 0xFFF];
@@ -112,7 +112,7 @@ impl Feedback {
         ranges.position().decode(self.position)
     }
 
-    /// Velocity \[rad/s\], filtered by the motor and coarse: a controller takes the velocity from positions.
+    /// Velocity \[rad/s\], filtered by the motor and coarse; a controller computes the velocity from positions instead.
     pub fn velocity_rad_per_s(&self, ranges: &Ranges) -> f64 {
         ranges.velocity().decode(self.velocity)
     }

@@ -15,28 +15,28 @@ pub struct Firmware {
 pub const KNOWN_SERIES: [u8; 16] = [
     31, 32, 33, 34, 50, 51, 57, 60, 61, 62, 63, 64, 65, 70, 71, 73,
 ];
-/// First version with registers, the 8-bit id filter and a watchdog that runs only while the motor is enabled. The version itself
-/// is read from register 14: an older one that answers there is refused.
+/// First version with registers, the 8-bit id filter and a watchdog that runs only while the motor is enabled. Start-up
+/// reads the version from register 14 and refuses an older one.
 pub const MIN_VERSION: u8 = 13;
 /// First version with CAN FD.
 pub const FD_VERSION: u8 = 15;
-/// First version that answers register reads between the cyclic commands without mixing up replies.
+/// First version that answers register reads between the cyclic commands with unambiguous replies.
 pub const REGISTERS_IN_OPERATION_VERSION: u8 = 17;
 /// Version for four motors on one board, in which a write to register 80 saves the present position as the zero.
 pub const FOUR_MOTORS_VERSION: u8 = 41;
 
-/// Why a firmware is refused.
+/// Reason why a firmware is refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FirmwareError {
-    /// Not four digits.
+    /// The version does not consist of four digits.
     NotDigits([u8; 4]),
-    /// An unknown series.
+    /// The series is not known.
     Series(u8),
-    /// Older than version 13.
+    /// The firmware is older than version 13.
     TooOld(Firmware),
-    /// For four motors on one board.
+    /// The firmware is for four motors on one board.
     FourMotors(Firmware),
-    /// Too old for CAN FD.
+    /// The firmware is too old for CAN FD.
     NoFd(Firmware),
 }
 
@@ -58,12 +58,12 @@ impl fmt::Display for FirmwareError {
             }
             FirmwareError::FourMotors(found) => write!(
                 f,
-                "{found} is for four motors on one board, where a register write can move the zero"
+                "{found} is for four motors on one board, on which a register write can move the zero position"
             ),
             FirmwareError::NoFd(found) => {
                 write!(
                     f,
-                    "{found} has no CAN FD, which begins with version {FD_VERSION}"
+                    "{found} has no CAN FD, which requires version {FD_VERSION} or later"
                 )
             }
         }
@@ -73,10 +73,10 @@ impl fmt::Display for FirmwareError {
 impl core::error::Error for FirmwareError {}
 
 impl Firmware {
-    /// The version of four ASCII digits.
+    /// Parses a version of four ASCII digits.
     ///
     /// # Errors
-    /// [`FirmwareError::NotDigits`].
+    /// [`FirmwareError::NotDigits`] if the text is not four digits.
     pub fn parse(text: [u8; 4]) -> Result<Firmware, FirmwareError> {
         if !text.iter().all(u8::is_ascii_digit) {
             return Err(FirmwareError::NotDigits(text));
@@ -91,7 +91,7 @@ impl Firmware {
     /// Checks that this firmware is supported for the motors of an arm, on CAN FD if `fd`.
     ///
     /// # Errors
-    /// [`FirmwareError`].
+    /// [`FirmwareError`] with the reason.
     pub fn check(self, fd: bool) -> Result<(), FirmwareError> {
         if !KNOWN_SERIES.contains(&self.series) {
             return Err(FirmwareError::Series(self.series));
@@ -108,7 +108,7 @@ impl Firmware {
         Ok(())
     }
 
-    /// Whether registers may be read between the cyclic commands.
+    /// Whether a host may read registers between the cyclic commands.
     pub fn reads_registers_in_operation(self) -> bool {
         self.version >= REGISTERS_IN_OPERATION_VERSION
     }

@@ -1,9 +1,9 @@
-//! A frame of these motors: an 11-bit id and up to eight bytes, the same in classic CAN and in CAN FD.
+//! A frame of Damiao motors: an 11-bit id and up to eight bytes, which are the same on classic CAN and on CAN FD.
 
 use core::fmt;
 use supple_can_frame::{CanFrame, CanId, FrameFormat};
 
-/// Id and payload.
+/// A frame: id and payload.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub struct Frame {
     id: u16,
@@ -12,12 +12,12 @@ pub struct Frame {
     bytes: [u8; 8],
 }
 
-/// Error: not a frame of these motors.
+/// Error: the frame is not a frame of Damiao motors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameError {
-    /// An id of more than 11 bits.
+    /// The id has more than 11 bits.
     Id(u32),
-    /// A payload of this many bytes; these motors use eight at most.
+    /// The payload has this many bytes; the maximum is eight.
     Length(usize),
 }
 
@@ -28,7 +28,7 @@ impl fmt::Display for FrameError {
             FrameError::Length(found) => {
                 write!(
                     f,
-                    "payload has {found} bytes, frames of these motors at most 8"
+                    "payload has {found} bytes, frames of Damiao motors have at most 8"
                 )
             }
         }
@@ -38,10 +38,10 @@ impl fmt::Display for FrameError {
 impl core::error::Error for FrameError {}
 
 impl Frame {
-    /// A frame with `payload`, eight bytes at most.
+    /// Creates a frame with a payload of at most eight bytes.
     ///
     /// # Errors
-    /// An id above 0x7FF, or a longer payload.
+    /// [`FrameError`] for an id above 0x7FF or a longer payload.
     pub fn new(id: u32, payload: &[u8]) -> Result<Frame, FrameError> {
         if id > 0x7FF {
             return Err(FrameError::Id(id));
@@ -58,7 +58,7 @@ impl Frame {
         })
     }
 
-    /// A frame of eight bytes; of the id the low 11 bits.
+    /// Creates a frame of eight bytes with the low 11 bits of `id`.
     pub(crate) const fn of(id: u16, bytes: [u8; 8]) -> Frame {
         Frame {
             id: id & 0x7FF,
@@ -67,10 +67,10 @@ impl Frame {
         }
     }
 
-    /// The frame on a bus of this format. Classic and FD frames of these motors have the same bytes.
+    /// Converts to a frame of this format for the bus. Classic and FD frames have the same bytes.
     pub fn on_bus(&self, format: FrameFormat) -> CanFrame {
         let frame = CanFrame::of(CanId::standard_masked(self.id), self.bytes);
-        // Shorter frames exist only as answers, which a host does not send.
+        // Shorter frames exist only as replies, which a host does not send.
         let frame = match self.length {
             8 => frame,
             _ => CanFrame::new(frame.id(), self.payload()).unwrap_or(frame),
@@ -81,7 +81,7 @@ impl Frame {
         }
     }
 
-    /// The frame of a bus, of either format.
+    /// Converts a frame of either format from the bus.
     ///
     /// # Errors
     /// [`FrameError`] for an extended id or more than eight bytes.
@@ -102,7 +102,7 @@ impl Frame {
         self.bytes.get(..usize::from(self.length)).unwrap_or(&[])
     }
 
-    /// The payload if it has eight bytes.
+    /// Returns the payload if it has eight bytes.
     pub fn eight(&self) -> Option<&[u8; 8]> {
         (self.length == 8).then_some(&self.bytes)
     }

@@ -1,58 +1,58 @@
-//! Conditions of a motor in a running cycle, as named faults.
+//! Detects faults of a motor in the cycle.
 //!
-//! [`MotorGuard::cycle`] is called once per cycle with the feedback that arrived in it. An error code or a motor that
-//! came back disabled is a fault in the same cycle, a silent motor in the second cycle. A fault stays until the
-//! operator resets the drive: nothing here clears an error or enables a motor.
+//! The drive calls [`MotorGuard::cycle`] once per cycle with the feedback that arrived in it. An error code, or a motor that
+//! reports that it is disabled, is a fault in the same cycle; a silent motor is a fault in the second cycle. A fault stays
+//! until the operator resets the drive: the guard clears no error and enables no motor.
 
 use crate::feedback::Feedback;
 use crate::ranges::Ranges;
 use crate::register::{Register, Value};
 use crate::status::Status;
-use crate::temperature::{Heat, Thermal};
+use crate::temperature::{TemperatureLevel, TemperatureLimits};
 use core::fmt;
 
-/// Cycles without feedback in a row that are a fault.
+/// Number of consecutive cycles without feedback that is a fault.
 pub const SILENT_CYCLES: u32 = 2;
 
-/// Why a motor may no longer be driven.
+/// Fault for which a motor may no longer apply torque.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MotorFault {
     /// The motor reports an error and has no torque.
     Error(Status),
-    /// The motor is disabled though nobody asked for it: it lost its supply, or another host disabled it.
+    /// The motor is disabled although this host did not disable it: it lost its supply, or another host disabled it.
     Disabled,
-    /// No feedback in this many cycles in a row.
+    /// No feedback arrived in this number of consecutive cycles.
     Silent {
-        /// Cycles.
+        /// Number of cycles.
         cycles: u32,
     },
-    /// Hotter than the arm allows.
+    /// The motor is above the fault temperature.
     Hot {
         /// Temperature \[degrees Celsius\].
         celsius: u8,
     },
-    /// The position jumped farther than the motor can turn: a range register changed, or the encoder slipped.
+    /// The position changed by more than the motor can turn in a cycle: a range register changed, or the encoder slipped.
     PositionJump {
         /// Distance \[rad\].
         by_rad: f64,
-        /// Distance at the highest speed \[rad\].
+        /// Maximum distance in a cycle \[rad\].
         limit_rad: f64,
     },
-    /// A register has another value than at the start.
+    /// A register has another value than at start-up.
     RegisterChanged {
         /// Register.
         register: Register,
-        /// Value at the start.
+        /// Value at start-up.
         was: Value,
         /// Value found.
         is: Value,
     },
-    /// Feedback that is not this motor's on its reply id: two motors have one.
+    /// Feedback of another motor has this motor's reply id: two motors have the same reply id.
     ForeignFeedback {
         /// Low four bits of the id that answered.
         found: u8,
     },
-    /// More answers than questions: two motors have this id.
+    /// More than one reply arrived to a command: two motors have this id.
     TwoAnswers,
 }
 
@@ -63,48 +63,48 @@ impl fmt::Display for MotorFault {
             MotorFault::Disabled => {
                 write!(
                     f,
-                    "disabled without a request: lost its supply, or another host"
+                    "disabled without a request: it lost its supply, or another host disabled it"
                 )
             }
             MotorFault::Silent { cycles } => write!(f, "no feedback in {cycles} cycles"),
             MotorFault::Hot { celsius } => write!(f, "{celsius} degrees Celsius"),
             MotorFault::PositionJump { by_rad, limit_rad } => write!(
                 f,
-                "position jumped by {by_rad:.4} rad in a cycle, possible are {limit_rad:.4} rad"
+                "position jumped by {by_rad:.4} rad in a cycle, the maximum is {limit_rad:.4} rad"
             ),
             MotorFault::RegisterChanged { register, was, is } => {
                 write!(f, "{register} changed from {was} to {is}")
             }
             MotorFault::ForeignFeedback { found } => {
-                write!(f, "motor {found} answered with its reply id")
+                write!(f, "motor {found} replied with the reply id of this motor")
             }
-            MotorFault::TwoAnswers => write!(f, "two motors answer with its id"),
+            MotorFault::TwoAnswers => write!(f, "two motors reply with this id"),
         }
     }
 }
 
 impl core::error::Error for MotorFault {}
 
-/// Guard of one motor while it is meant to be enabled.
+/// Guard of one motor while it should be enabled.
 #[derive(Clone, Copy, Debug)]
 pub struct MotorGuard {
     id: u8,
     ranges: Ranges,
-    thermal: Thermal,
-    /// Distance that the motor can turn in a cycle \[rad\].
+    thermal: TemperatureLimits,
+    /// Maximum distance that the motor can turn in a cycle \[rad\].
     jump_rad: f64,
     silent: u32,
     /// Last position \[rad\].
     position_rad: Option<f64>,
-    heat: Heat,
+    heat: TemperatureLevel,
     celsius: u8,
     fault: Option<MotorFault>,
 }
 
 impl MotorGuard {
-    /// Guard of the motor with `id`, with the ranges that it reported, in cycles of `period_s` \[s\].
-    pub fn new(id: u8, ranges: Ranges, thermal: Thermal, period_s: f64) -> MotorGuard {
-        // Rounding moves a position by one step; a bridged cycle doubles the distance.
+    /// Creates the guard of the motor with `id`, which reported `ranges`, for cycles of `period_s` \[s\].
+    pub fn new(id: u8, ranges: Ranges, thermal: TemperatureLimits, period_s: f64) -> MotorGuard {
+        // Rounding changes a position by one step; a cycle without feedback doubles the distance.
         let jump_rad = ranges.velocity().max() * period_s + 2.0 * ranges.position().step();
         MotorGuard {
             id,
@@ -113,29 +113,29 @@ impl MotorGuard {
             jump_rad,
             silent: 0,
             position_rad: None,
-            heat: Heat::Normal,
+            heat: TemperatureLevel::Normal,
             celsius: 0,
             fault: None,
         }
     }
 
-    /// Judges one cycle. `feedback` is the last one that arrived in it, `None` if none did; `answers` is how many frames
-    /// arrived for the one command of the cycle.
+    /// Checks one cycle. `feedback` is the last feedback that arrived in the cycle, if any; `replies` is the number of frames
+    /// that arrived for the one command of the cycle.
     ///
     /// # Errors
-    /// The first fault, in this and in all later cycles. Silence is reported as long as it lasts; what follows it is checked again.
-    pub fn cycle(&mut self, feedback: Option<&Feedback>, answers: u32) -> Result<(), MotorFault> {
+    /// The first fault, in this and in all later cycles. Silence is an exception: it is reported only while it lasts.
+    pub fn cycle(&mut self, feedback: Option<&Feedback>, replies: u32) -> Result<(), MotorFault> {
         if let Some(fault) = self.fault {
             return Err(fault);
         }
-        let found = self.judge(feedback, answers);
+        let found = self.check(feedback, replies);
         self.fault = found
             .err()
             .filter(|fault| !matches!(fault, MotorFault::Silent { .. }));
         found
     }
 
-    fn judge(&mut self, feedback: Option<&Feedback>, answers: u32) -> Result<(), MotorFault> {
+    fn check(&mut self, feedback: Option<&Feedback>, replies: u32) -> Result<(), MotorFault> {
         let Some(feedback) = feedback else {
             self.silent += 1;
             return match self.silent {
@@ -149,7 +149,7 @@ impl MotorGuard {
             let found = feedback.motor;
             return Err(MotorFault::ForeignFeedback { found });
         }
-        if answers > 1 {
+        if replies > 1 {
             return Err(MotorFault::TwoAnswers);
         }
         match feedback.status {
@@ -159,7 +159,7 @@ impl MotorGuard {
         }
         self.celsius = feedback.hottest_celsius();
         self.heat = self.thermal.heat(self.celsius);
-        if self.heat == Heat::Fault {
+        if self.heat == TemperatureLevel::Fault {
             let celsius = self.celsius;
             return Err(MotorFault::Hot { celsius });
         }
@@ -175,10 +175,10 @@ impl MotorGuard {
         Ok(())
     }
 
-    /// Compares a register that was read between cycles with its value at the start.
+    /// Compares a register that was read between cycles with its value at start-up.
     ///
     /// # Errors
-    /// [`MotorFault::RegisterChanged`], or the earlier fault.
+    /// [`MotorFault::RegisterChanged`] if the values differ, or an earlier fault.
     pub fn register(
         &mut self,
         register: Register,
@@ -188,7 +188,7 @@ impl MotorGuard {
         if let Some(fault) = self.fault {
             return Err(fault);
         }
-        // By bytes, so that a NaN is equal to itself.
+        // The bytes are compared, so that a NaN is equal to itself.
         if was.to_bytes() == is.to_bytes() {
             return Ok(());
         }
@@ -197,13 +197,13 @@ impl MotorGuard {
         Err(fault)
     }
 
-    /// Cycles since the last feedback: 0 in a cycle with one. A state is not used if this is 2 or more.
+    /// Returns the number of cycles since the last feedback, 0 in a cycle with feedback. From 2 on, the state is not used.
     pub const fn age_cycles(&self) -> u32 {
         self.silent
     }
 
-    /// How hot the motor is.
-    pub const fn heat(&self) -> Heat {
+    /// Returns the temperature level of the motor.
+    pub const fn heat(&self) -> TemperatureLevel {
         self.heat
     }
 
@@ -212,7 +212,7 @@ impl MotorGuard {
         self.celsius
     }
 
-    /// Share of the torque limit that the temperature leaves.
+    /// Returns the fraction of the torque limit that the temperature allows.
     pub fn torque_share(&self) -> f64 {
         self.thermal.torque_share(self.celsius)
     }

@@ -1,15 +1,15 @@
-//! What a start-up compares: registers of a motor against what the arm's file expects.
+//! Checks at start-up: compares the registers of a motor with the values that the arm's TOML expects.
 //!
-//! [`Readings`] collects the replies to [`TO_READ`]; [`Expectation::check`] gives the motor's ranges and the registers
-//! to write, or the first [`Refusal`] with register, found, expected and remedy. Mode and watchdog are set at every
-//! start, in RAM; all else is the operator's to change.
+//! [`RegisterReadings`] collects the replies to [`TO_READ`]; [`Expectation::check`] returns the motor's ranges and the
+//! registers to write, or the first [`Refusal`] with register, found value, expected value and remedy. Start-up sets mode
+//! and watchdog in RAM every time; only the operator changes other registers.
 
 use crate::firmware::Firmware;
 use crate::ranges::Ranges;
 use crate::refusal::{Problem, Refusal};
 use crate::register::{Register, Value};
 
-/// Registers that a start-up reads, in this order.
+/// Registers that start-up reads, in this order.
 pub const TO_READ: [Register; 14] = [
     Register::ID,
     Register::REPLY_ID,
@@ -26,35 +26,35 @@ pub const TO_READ: [Register; 14] = [
     Register::SERIAL,
     Register::SHAFT_POSITION,
 ];
-/// Impedance mode in [`Register::MODE`].
+/// Value of [`Register::MODE`] for impedance mode.
 pub const MIT_MODE: u32 = 1;
 /// Units of [`Register::TIMEOUT`] \[s\].
 pub const TIMEOUT_UNIT_S: f64 = 50e-6;
-/// Difference of a gear ratio that is rounding or calibration: a calibrated motor of ratio 10 reads 10.01.
+/// Tolerance of the gear ratio for rounding and calibration: a calibrated motor of ratio 10 may report 10.01.
 const GEAR_TOLERANCE: f64 = 0.02;
-/// Difference of a range that is rounding.
+/// Tolerance of a range for rounding.
 const RANGE_TOLERANCE: f64 = 1e-4;
-/// Greatest distance between the position in a feedback and in [`Register::SHAFT_POSITION`] \[rad\].
+/// Maximum difference between the position in a feedback and in [`Register::SHAFT_POSITION`] \[rad\].
 const POSITION_TOLERANCE_RAD: f64 = 0.01;
 
 /// Replies to [`TO_READ`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Readings([Option<[u8; 4]>; TO_READ.len()]);
+pub struct RegisterReadings([Option<[u8; 4]>; TO_READ.len()]);
 
-impl Readings {
-    /// Nothing read.
-    pub const fn new() -> Readings {
-        Readings([None; TO_READ.len()])
+impl RegisterReadings {
+    /// Creates the collection without replies.
+    pub const fn new() -> RegisterReadings {
+        RegisterReadings([None; TO_READ.len()])
     }
 
-    /// Notes a reply; registers that are not in [`TO_READ`] are ignored.
-    pub fn note(&mut self, register: Register, bytes: [u8; 4]) {
+    /// Adds a reply; ignores registers that are not in [`TO_READ`].
+    pub fn insert(&mut self, register: Register, bytes: [u8; 4]) {
         if let Some(at) = TO_READ.iter().position(|known| *known == register) {
             self.0[at] = Some(bytes);
         }
     }
 
-    /// Value of a register, if it was read.
+    /// Returns the value of a register, if it was read.
     pub fn get(&self, register: Register) -> Option<Value> {
         let at = TO_READ.iter().position(|known| *known == register)?;
         let kind = register.info()?.kind;
@@ -64,24 +64,24 @@ impl Readings {
     fn integer(&self, register: Register) -> Result<u32, Problem> {
         match self.get(register) {
             Some(Value::Integer(value)) => Ok(value),
-            _ => Err(Problem::NotRead(register)),
+            _ => Err(Problem::RegisterNotRead(register)),
         }
     }
 
     fn float(&self, register: Register) -> Result<f64, Problem> {
         match self.get(register) {
             Some(Value::Float(value)) => Ok(f64::from(value)),
-            _ => Err(Problem::NotRead(register)),
+            _ => Err(Problem::RegisterNotRead(register)),
         }
     }
 }
 
-/// What the arm's file states of one motor.
+/// Values that the arm's TOML expects of one motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Expectation<'a> {
-    /// Id that it listens to.
+    /// Id of the frames to the motor.
     pub id: u8,
-    /// Id of its replies.
+    /// Id of the motor's replies.
     pub reply_id: u16,
     /// Gear ratio.
     pub gear_ratio: f64,
@@ -91,9 +91,9 @@ pub struct Expectation<'a> {
     pub velocity_range_rad_per_s: f64,
     /// TMAX \[N m\].
     pub torque_range_nm: f64,
-    /// Beginning of the firmware version; `None` for any known series.
+    /// First digits of the firmware version; `None` accepts every known series.
     pub firmware_series: Option<&'a str>,
-    /// Silence of the host after which the motor disables itself \[s\].
+    /// Watchdog time: time without a command after which the motor disables itself \[s\].
     pub watchdog_s: f64,
     /// Whether the motor may lack a watchdog.
     pub without_watchdog: bool,
@@ -101,40 +101,40 @@ pub struct Expectation<'a> {
     pub fd: bool,
 }
 
-/// A motor that fits.
+/// A motor that matches the expectation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Inspected {
-    /// Its ranges.
+pub struct InspectedMotor {
+    /// Ranges of position, velocity and torque.
     pub ranges: Ranges,
-    /// Its firmware.
+    /// Firmware version.
     pub firmware: Firmware,
-    /// Whether its mode is to be written.
+    /// Whether start-up must write the mode.
     pub write_mode: bool,
-    /// Value of [`Register::TIMEOUT`] to write; `None` if it has it already.
+    /// Value of [`Register::TIMEOUT`] that start-up must write; `None` if the register already has it.
     pub write_timeout: Option<u32>,
 }
 
 impl Expectation<'_> {
-    /// Value of [`Register::TIMEOUT`] for the watchdog, at least 1.
+    /// Returns the value of [`Register::TIMEOUT`] for the watchdog time, at least 1.
     pub fn timeout(&self) -> u32 {
         ((self.watchdog_s / TIMEOUT_UNIT_S + 0.5) as u32).max(1)
     }
 
-    /// Compares everything that was read. `feedback_rad` is the motor's position by its last feedback \[rad\], decoded
-    /// with its own range; `None` to skip that comparison.
+    /// Compares all readings with the expectation. `feedback_rad` is the position in the motor's last feedback \[rad\], decoded
+    /// with the range that the motor reported; `None` skips the comparison of positions.
     ///
     /// # Errors
     /// The first [`Refusal`], in the order of [`TO_READ`].
     pub fn check(
         &self,
-        readings: &Readings,
+        readings: &RegisterReadings,
         feedback_rad: Option<f64>,
-    ) -> Result<Inspected, Refusal> {
+    ) -> Result<InspectedMotor, Refusal> {
         self.compare(readings, feedback_rad)
             .map_err(|problem| self.refuse(problem))
     }
 
-    /// A refusal of this motor.
+    /// Creates a refusal of this motor.
     pub fn refuse(&self, problem: Problem) -> Refusal {
         Refusal {
             motor: self.id,
@@ -142,10 +142,10 @@ impl Expectation<'_> {
         }
     }
 
-    /// Checks the mode or the watchdog after it was written and read back.
+    /// Checks the mode or the watchdog register after start-up has written it and read it back.
     ///
     /// # Errors
-    /// [`Problem::NotWritten`]; not for the watchdog of a motor that may lack one.
+    /// [`Problem::WriteIgnored`] if the value differs, except for the watchdog of a motor that may lack one.
     pub fn check_written(
         &self,
         register: Register,
@@ -156,7 +156,7 @@ impl Expectation<'_> {
         if found == expected || allowed {
             return Ok(());
         }
-        Err(self.refuse(Problem::NotWritten {
+        Err(self.refuse(Problem::WriteIgnored {
             register,
             found,
             expected,
@@ -165,16 +165,16 @@ impl Expectation<'_> {
 
     fn compare(
         &self,
-        readings: &Readings,
+        readings: &RegisterReadings,
         feedback_rad: Option<f64>,
-    ) -> Result<Inspected, Problem> {
+    ) -> Result<InspectedMotor, Problem> {
         for (register, expected) in [
             (Register::ID, u32::from(self.id)),
             (Register::REPLY_ID, u32::from(self.reply_id)),
         ] {
             let found = readings.integer(register)?;
             if found != expected {
-                return Err(Problem::Integer {
+                return Err(Problem::IntegerMismatch {
                     register,
                     found,
                     expected,
@@ -203,7 +203,7 @@ impl Expectation<'_> {
             let found = readings.float(register)?;
             let close = (found - expected).abs() <= tolerance * expected;
             if !close {
-                return Err(Problem::Number {
+                return Err(Problem::NumberMismatch {
                     register,
                     found,
                     expected,
@@ -216,7 +216,7 @@ impl Expectation<'_> {
             range(Register::VELOCITY_RANGE)?,
             range(Register::TORQUE_RANGE)?,
         )
-        .map_err(|error| Problem::Number {
+        .map_err(|error| Problem::NumberMismatch {
             register: Register::POSITION_RANGE,
             found: error.found,
             expected: self.position_range_rad,
@@ -227,13 +227,13 @@ impl Expectation<'_> {
         if let Some(feedback_rad) = feedback_rad {
             let close = (feedback_rad - register_rad).abs() <= POSITION_TOLERANCE_RAD;
             if !close {
-                return Err(Problem::Position {
+                return Err(Problem::PositionMismatch {
                     feedback_rad,
                     register_rad,
                 });
             }
         }
-        Ok(Inspected {
+        Ok(InspectedMotor {
             ranges,
             firmware,
             write_mode: mode != MIT_MODE,
@@ -241,12 +241,14 @@ impl Expectation<'_> {
         })
     }
 
-    fn firmware(&self, readings: &Readings) -> Result<Firmware, Problem> {
+    fn firmware(&self, readings: &RegisterReadings) -> Result<Firmware, Problem> {
         let Some(Value::Text(text)) = readings.get(Register::FIRMWARE) else {
-            return Err(Problem::NotRead(Register::FIRMWARE));
+            return Err(Problem::RegisterNotRead(Register::FIRMWARE));
         };
-        let firmware = Firmware::parse(text).map_err(Problem::Firmware)?;
-        firmware.check(self.fd).map_err(Problem::Firmware)?;
+        let firmware = Firmware::parse(text).map_err(Problem::UnsupportedFirmware)?;
+        firmware
+            .check(self.fd)
+            .map_err(Problem::UnsupportedFirmware)?;
         if let Some(series) = self.firmware_series
             && !text.starts_with(series.as_bytes())
         {
@@ -254,7 +256,7 @@ impl Expectation<'_> {
             for (to, from) in expected.iter_mut().zip(series.bytes()) {
                 *to = from;
             }
-            return Err(Problem::Series {
+            return Err(Problem::FirmwareSeriesMismatch {
                 found: firmware,
                 expected,
             });

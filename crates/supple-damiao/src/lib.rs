@@ -1,13 +1,13 @@
-//! Codec of Damiao joint motors ("DM-J") on CAN and CAN FD, between frames and typed values.
+//! Codec of Damiao joint motors ("DM-J") on CAN and CAN FD: converts between frames and typed values.
 //!
-//! Pure conversions: this crate opens no socket, reads no clock and allocates nothing. Besides the codec it holds the
-//! pure parts of a drive: what a start-up compares ([`inspection`]), what an error code means ([`status`]), how hot a
-//! motor may be ([`temperature`]), and which angle a position means ([`position`]).
+//! This crate opens no socket, reads no clock and allocates no memory. Besides the codec, it contains those parts of a drive
+//! that are pure functions: the checks of start-up ([`inspection`]), error codes ([`status`]), temperature limits
+//! ([`temperature`]), and the conversion from positions to joint angles ([`position`]).
 //!
-//! Three rules keep an arm safe here:
-//! - A command never equals a special frame: the code of the motor's own stiffness stops at 0xFFE.
-//! - No type of the running path can write flash or set a zero; [`flash`] holds these frames apart.
-//! - Ranges are values that the motor reported ([`Ranges`]), never a table by type.
+//! Three rules of this crate keep an arm safe:
+//! - A command never equals a special frame, because the code of the motor's stiffness is at most 0xFFE.
+//! - No type that a drive uses can write flash or set a zero position; these frames are in [`flash`].
+//! - Ranges are values that the motor reported ([`Ranges`]), never a table of motor types.
 //!
 //! The facts come from the makers' manuals and change log and from the public drivers openarm_can, i2rt,
 //! python-damiao-driver and DM_Control_Python.
@@ -52,5 +52,5 @@ pub use refusal::{Problem, Refusal};
 pub use register::{Register, RegisterReply, Value};
 pub use request::Request;
 pub use shaping::TorqueShaper;
-pub use special::Special;
+pub use special::SpecialCommand;
 pub use status::Status;

@@ -3,7 +3,7 @@
 //! The motor applies `kp (p - q) + kd (v - qd) + torque` at its output shaft. Layout, big-endian without gaps: position
 //! 16 bits, velocity, kp, kd and torque 12 bits each.
 //!
-//! A command with the greatest position, velocity, kp and kd and a torque near the top of its range has the bytes of
+//! A command with the maximum position, velocity, kp and kd and a torque near the top of its range has the bytes of
 //! "clear error", "enable", "disable" or "set zero". Therefore the code of kp stops at [`MAX_KP_CODE`]: byte 4 of a
 //! command is then never 0xFF, and byte 4 of every special frame is.
 
@@ -11,11 +11,11 @@ use crate::code::{LinearCode, NotANumber};
 use crate::frame::Frame;
 use crate::ranges::Ranges;
 
-/// kp, 0 to 500 N m/rad on every motor.
+/// Code of kp, 0 to 500 N m/rad on every motor.
 pub const KP: LinearCode = LinearCode::new(0.0, 500.0, 12);
-/// kd, 0 to 5 N m s/rad on every motor.
+/// Code of kd, 0 to 5 N m s/rad on every motor.
 pub const KD: LinearCode = LinearCode::new(0.0, 5.0, 12);
-/// Greatest code of kp that is ever sent: 499.88 N m/rad.
+/// Maximum code of kp that this crate sends: 499.88 N m/rad.
 pub const MAX_KP_CODE: u16 = 0xFFE;
 
 /// A command in SI units, at the motor's output shaft.
@@ -25,15 +25,15 @@ pub struct MitCommand {
     pub position_rad: f64,
     /// Velocity \[rad/s\].
     pub velocity_rad_per_s: f64,
-    /// Stiffness of the motor itself \[N m/rad\], 0 to 500.
+    /// Stiffness that the motor applies \[N m/rad\], 0 to 500.
     pub kp_nm_per_rad: f64,
-    /// Damping of the motor itself \[N m s/rad\], 0 to 5.
+    /// Damping that the motor applies \[N m s/rad\], 0 to 5.
     pub kd_nm_s_per_rad: f64,
     /// Torque \[N m\].
     pub torque_nm: f64,
 }
 
-/// A command as its codes.
+/// A command, as codes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MitCodes {
     /// Position, 16 bits.
@@ -49,7 +49,7 @@ pub struct MitCodes {
 }
 
 impl MitCommand {
-    /// No gains, no torque.
+    /// Command without gains and torque.
     pub const ZERO: MitCommand = MitCommand {
         position_rad: 0.0,
         velocity_rad_per_s: 0.0,
@@ -58,7 +58,7 @@ impl MitCommand {
         torque_nm: 0.0,
     };
 
-    /// The nearest codes; values beyond a range take its end.
+    /// Returns the nearest codes; a value outside its range gets the code of the nearer end.
     ///
     /// # Errors
     /// [`NotANumber`] if a value is not finite.
@@ -74,7 +74,7 @@ impl MitCommand {
         })
     }
 
-    /// The frame to the motor with `id`, 1 to 15.
+    /// Encodes the frame to the motor with `id`, 1 to 15.
     ///
     /// # Errors
     /// [`NotANumber`] if a value is not finite.
@@ -84,8 +84,8 @@ impl MitCommand {
 }
 
 impl MitCodes {
-    /// The frame to the motor with `id`. Bits above 12 are dropped, and kp is at most [`MAX_KP_CODE`], so that no codes
-    /// give a special frame.
+    /// Encodes the frame to the motor with `id`. Drops bits above 12 and limits kp to [`MAX_KP_CODE`], so that no combination
+    /// of codes gives a special frame.
     pub fn emit(&self, id: u8) -> Frame {
         let [p1, p0] = self.position.to_be_bytes();
         let [v, kd, t] = [self.velocity, self.kd, self.torque].map(|code| code & 0xFFF);
@@ -105,7 +105,7 @@ impl MitCodes {
         )
     }
 
-    /// Codes of a payload, which may be one that this crate would not send.
+    /// Parses the codes of a payload, which may be one that this crate does not send.
     pub fn parse(bytes: &[u8; 8]) -> MitCodes {
         let b = bytes.map(u16::from);
         MitCodes {
@@ -117,7 +117,7 @@ impl MitCodes {
         }
     }
 
-    /// Values of the codes.
+    /// Converts the codes to values.
     pub fn command(&self, ranges: &Ranges) -> MitCommand {
         MitCommand {
             position_rad: ranges.position().decode(self.position),

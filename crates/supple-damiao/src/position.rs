@@ -1,15 +1,16 @@
-//! From a motor's position to its joint's angle.
+//! Conversion from the position of a motor to the angle of its joint.
 //!
 //! The encoder of the output shaft is absolute within one turn, and turns are counted in RAM: after a power-up the
-//! position lies within half a turn of the zero. A joint with more than half a turn on one side can then start a
-//! whole turn off. [`JointAngle::unwrapped`] adds the turns that lead into the joint's limits, or refuses.
+//! position lies within half a turn of the zero. The position of a joint whose range extends more than half a
+//! turn to one side may then be wrong by a whole turn. [`JointAngle::unwrapped`] adds the number of turns that brings the
+//! angle within the joint's limits, or refuses the position.
 
 use core::f64::consts::TAU;
 use core::fmt;
 
-/// Greatest position that is accepted \[rad\]: a turn and a little.
+/// Maximum position that is accepted \[rad\]: slightly more than a turn.
 pub const MAX_POSITION_RAD: f64 = 6.5;
-/// Turns that are tried to either side.
+/// Number of turns that are tried in either direction.
 const TURNS: i32 = 3;
 
 /// Sign and offset between motor and joint.
@@ -19,15 +20,15 @@ pub struct JointAngle {
     offset_rad: f64,
 }
 
-/// Why a start position is refused.
+/// Reason why a start position is refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PositionError {
-    /// Not finite, or beyond [`MAX_POSITION_RAD`] after unwrapping.
+    /// The position is not finite, or beyond [`MAX_POSITION_RAD`] after unwrapping.
     Implausible {
         /// Position of the motor \[rad\].
         found_rad: f64,
     },
-    /// No whole number of turns leads into the limits.
+    /// No whole number of turns brings the angle within the limits.
     Outside {
         /// Angle of the joint without added turns \[rad\].
         found_rad: f64,
@@ -36,11 +37,11 @@ pub enum PositionError {
         /// Upper limit \[rad\].
         upper_rad: f64,
     },
-    /// Two numbers of turns lead into the limits.
+    /// Two numbers of turns bring the angle within the limits.
     Ambiguous {
-        /// One angle \[rad\].
+        /// First possible angle \[rad\].
         first_rad: f64,
-        /// The other \[rad\].
+        /// Second possible angle \[rad\].
         second_rad: f64,
     },
 }
@@ -49,7 +50,7 @@ impl fmt::Display for PositionError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             PositionError::Implausible { found_rad } => {
-                write!(f, "position is {found_rad:.4} rad, beyond any joint")
+                write!(f, "position is {found_rad:.4} rad, which no joint can have")
             }
             PositionError::Outside {
                 found_rad,
@@ -74,7 +75,7 @@ impl fmt::Display for PositionError {
 impl core::error::Error for PositionError {}
 
 impl JointAngle {
-    /// `direction` is 1 or -1; `offset_rad` is the joint's angle where the motor's position is zero.
+    /// Creates the conversion. `direction` is 1 or -1; `offset_rad` is the angle of the joint at the motor's zero position.
     pub const fn new(direction: f64, offset_rad: f64) -> JointAngle {
         JointAngle {
             direction: if direction < 0.0 { -1.0 } else { 1.0 },
@@ -82,21 +83,21 @@ impl JointAngle {
         }
     }
 
-    /// Angle of the joint \[rad\].
+    /// Returns the angle of the joint at this motor position \[rad\].
     pub fn joint_rad(&self, motor_rad: f64) -> f64 {
         self.direction * motor_rad + self.offset_rad
     }
 
-    /// Torque or velocity of the motor for one of the joint, and back.
+    /// Converts a torque or velocity from joint to motor, or from motor to joint.
     pub fn signed(&self, value: f64) -> f64 {
         self.direction * value
     }
 
-    /// The same with the turns added that bring `motor_rad` into the joint's limits. `slack_rad` is allowed outside of
-    /// them: a joint that rests on its stop.
+    /// Returns the conversion with the number of turns added that brings `motor_rad` within the joint's limits. The angle may
+    /// exceed the limits by `slack_rad`, because a joint may rest on its stop.
     ///
     /// # Errors
-    /// [`PositionError`].
+    /// [`PositionError`] with the reason.
     pub fn unwrapped(
         &self,
         motor_rad: f64,

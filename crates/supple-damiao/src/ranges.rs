@@ -1,10 +1,10 @@
-//! Ranges of position, velocity and torque in the frames of one motor: its registers PMAX, VMAX, TMAX.
+//! Ranges of position, velocity and torque in the frames of one motor, from its registers PMAX, VMAX and TMAX.
 
 use crate::code::LinearCode;
 use core::fmt;
 
-/// What a motor reported as its scales. They differ between motors of one type (velocity of the 4340: 8 in several
-/// libraries, 10 in the motor), therefore nothing here is a table.
+/// Ranges that a motor reported. They are not a table, because they differ between motors of one type (velocity of the
+/// 4340: 8 in several libraries, 10 in the motor).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ranges {
     position: LinearCode,
@@ -12,7 +12,7 @@ pub struct Ranges {
     torque: LinearCode,
 }
 
-/// A range that is not finite and positive.
+/// Error: a range is not finite and positive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RangeError {
     /// Name of the register.
@@ -34,7 +34,7 @@ impl fmt::Display for RangeError {
 impl core::error::Error for RangeError {}
 
 impl Ranges {
-    /// From PMAX \[rad\], VMAX \[rad/s\] and TMAX \[N m\], each plus or minus.
+    /// Creates the symmetric ranges from PMAX \[rad\], VMAX \[rad/s\] and TMAX \[N m\].
     ///
     /// # Errors
     /// [`RangeError`] for a value that is not finite, not positive or above 10000.

@@ -1,4 +1,4 @@
-//! Why a start-up refuses a motor: register, found, expected and remedy.
+//! Reasons why start-up refuses a motor; each error contains register, found value, expected value and remedy.
 
 use crate::feedback::FeedbackError;
 use crate::firmware::{Firmware, FirmwareError};
@@ -6,7 +6,7 @@ use crate::register::Register;
 use crate::status::Status;
 use core::fmt;
 
-/// Why a motor is refused.
+/// Refusal of a motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Refusal {
     /// Id of the motor in the arm's file.
@@ -18,32 +18,32 @@ pub struct Refusal {
 /// Reason of a refusal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Problem {
-    /// No answer at all.
+    /// The motor does not answer.
     Silent,
     /// More than one motor answers.
     TwoAnswers,
-    /// A frame with its reply id is not its feedback.
-    Reply(FeedbackError),
-    /// It answers with another id than expected.
-    ReplyId {
+    /// A frame with the motor's reply id is not its feedback.
+    ForeignFeedback(FeedbackError),
+    /// The motor answers with another id than expected.
+    ReplyIdMismatch {
         /// Found.
         found: u16,
         /// Expected.
         expected: u16,
     },
-    /// Answers in frames of the other format.
-    Format {
-        /// Whether its frames are FD.
+    /// The motor answers with frames of the other format.
+    FormatMismatch {
+        /// Whether the frames of the motor are FD frames.
         found_fd: bool,
     },
-    /// It is enabled before this host enabled it.
-    Enabled,
-    /// It reports an error.
-    Error(Status),
-    /// A register did not answer.
-    NotRead(Register),
-    /// An integer register that differs.
-    Integer {
+    /// The motor was enabled before this host enabled it.
+    AlreadyEnabled,
+    /// The motor reports an error.
+    MotorError(Status),
+    /// The motor did not answer the read of a register.
+    RegisterNotRead(Register),
+    /// An integer register has another value than expected.
+    IntegerMismatch {
         /// Register.
         register: Register,
         /// Found.
@@ -51,8 +51,8 @@ pub enum Problem {
         /// Expected.
         expected: u32,
     },
-    /// A number that differs.
-    Number {
+    /// A floating-point register has another value than expected.
+    NumberMismatch {
         /// Register.
         register: Register,
         /// Found.
@@ -60,17 +60,17 @@ pub enum Problem {
         /// Expected.
         expected: f64,
     },
-    /// A firmware of another series than expected.
-    Series {
+    /// The firmware is of another series than expected.
+    FirmwareSeriesMismatch {
         /// Found.
         found: Firmware,
         /// Expected, two digits.
         expected: [u8; 2],
     },
-    /// A firmware that cannot carry an arm.
-    Firmware(FirmwareError),
-    /// A register that keeps another value than the one written.
-    NotWritten {
+    /// The firmware is not supported for an arm.
+    UnsupportedFirmware(FirmwareError),
+    /// A register does not have the value that was written.
+    WriteIgnored {
         /// Register.
         register: Register,
         /// Found after the write.
@@ -78,57 +78,63 @@ pub enum Problem {
         /// Written.
         expected: u32,
     },
-    /// Feedback and register disagree about the position.
-    Position {
-        /// By feedback \[rad\].
+    /// The position in the feedback differs from the position in the register.
+    PositionMismatch {
+        /// Position in the feedback \[rad\].
         feedback_rad: f64,
-        /// By register \[rad\].
+        /// Position in the register \[rad\].
         register_rad: f64,
     },
 }
 
 impl Problem {
-    /// What to do about it.
+    /// Returns the remedy.
     pub const fn remedy(&self) -> &'static str {
         match self {
             Problem::Silent => {
                 "check its supply, cable and bit rate, and its id with `supple motors`"
             }
             Problem::TwoAnswers => {
-                "give every motor its own id, one at a time on the bus: `supple motors`"
+                "give every motor its own id with `supple motors`, with one motor at a time on the bus"
             }
-            Problem::Reply(_) => {
-                "give every motor its own id and its own MST_ID, one at a time on the bus: `supple motors`"
+            Problem::ForeignFeedback(_) => {
+                "give every motor its own id and MST_ID with `supple motors`, with one motor at a time on the bus"
             }
-            Problem::ReplyId { .. } => "set MST_ID of the motor, or reply_id in the arm's file",
-            Problem::Format { .. } => {
-                "set can_br of all motors alike, and `format` in the arm's file to it"
+            Problem::ReplyIdMismatch { .. } => {
+                "set MST_ID of the motor, or reply_id in the arm's file"
             }
-            Problem::Enabled => "stop the other host, or switch the motor off and on",
-            Problem::Error(_) => {
+            Problem::FormatMismatch { .. } => {
+                "set can_br of all motors to the same format, and `format` in the arm's file accordingly"
+            }
+            Problem::AlreadyEnabled => "stop the other host, or switch the motor off and on",
+            Problem::MotorError(_) => {
                 "remove the cause, let hot motors cool down, then clear it with `supple motors`"
             }
-            Problem::NotRead(_) => "check the cable; firmware below version 13 has no registers",
-            Problem::Integer { .. } => {
+            Problem::RegisterNotRead(_) => {
+                "check the cable; firmware below version 13 has no registers"
+            }
+            Problem::IntegerMismatch { .. } => {
                 "set the register with `supple motors`, or correct the arm's file"
             }
-            Problem::Number { register, .. } => match *register {
+            Problem::NumberMismatch { register, .. } => match *register {
                 Register::GEAR_RATIO => {
-                    "another type of motor, or two motors swapped: check ids and the arm's file"
+                    "the motor is of another type, or two motors are swapped: check ids and the arm's file"
                 }
                 _ => {
-                    "correct the arm's file if the motor is the right one; never write this register"
+                    "check that the motor is the right one, then correct the arm's file; never write this register"
                 }
             },
-            Problem::Series { .. } => {
-                "another type of motor, or two motors swapped: check ids and the arm's file"
+            Problem::FirmwareSeriesMismatch { .. } => {
+                "the motor is of another type, or two motors are swapped: check ids and the arm's file"
             }
-            Problem::Firmware(_) => "update the motor's firmware with the maker's program",
-            Problem::NotWritten { .. } => {
-                "update its firmware, or allow it by name in the arm's file with without_watchdog = true"
+            Problem::UnsupportedFirmware(_) => {
+                "update the motor's firmware with the maker's program"
             }
-            Problem::Position { .. } => {
-                "switch the motor off and on; do not set a zero while it turns"
+            Problem::WriteIgnored { .. } => {
+                "update the motor's firmware, or allow a motor without watchdog in the arm's file with without_watchdog = true"
+            }
+            Problem::PositionMismatch { .. } => {
+                "switch the motor off and on; do not set a zero position while it turns"
             }
         }
     }
@@ -139,41 +145,41 @@ impl fmt::Display for Problem {
         match self {
             Problem::Silent => write!(f, "does not answer"),
             Problem::TwoAnswers => write!(f, "two motors answer with this id"),
-            Problem::Reply(error) => write!(f, "{error}"),
-            Problem::ReplyId { found, expected } => {
+            Problem::ForeignFeedback(error) => write!(f, "{error}"),
+            Problem::ReplyIdMismatch { found, expected } => {
                 write!(f, "answers with id {found:#05x}, expected {expected:#05x}")
             }
-            Problem::Format { found_fd } => {
+            Problem::FormatMismatch { found_fd } => {
                 let (found, expected) = match found_fd {
                     true => ("FD", "classic"),
                     false => ("classic", "FD"),
                 };
                 write!(f, "answers with {found} frames, expected {expected}")
             }
-            Problem::Enabled => write!(f, "is already enabled"),
-            Problem::Error(status) => write!(f, "reports: {status}"),
-            Problem::NotRead(register) => write!(f, "{register} does not answer"),
-            Problem::Integer {
+            Problem::AlreadyEnabled => write!(f, "is already enabled"),
+            Problem::MotorError(status) => write!(f, "reports: {status}"),
+            Problem::RegisterNotRead(register) => write!(f, "{register} does not answer"),
+            Problem::IntegerMismatch {
                 register,
                 found,
                 expected,
             } => write!(f, "{register} is {found}, expected {expected}"),
-            Problem::Number {
+            Problem::NumberMismatch {
                 register,
                 found,
                 expected,
             } => write!(f, "{register} is {found}, expected {expected}"),
-            Problem::Series { found, expected } => {
+            Problem::FirmwareSeriesMismatch { found, expected } => {
                 let [a, b] = expected.map(char::from);
                 write!(f, "{} is {found}, expected {a}{b}..", Register::FIRMWARE)
             }
-            Problem::Firmware(error) => write!(f, "{}: {error}", Register::FIRMWARE),
-            Problem::NotWritten {
+            Problem::UnsupportedFirmware(error) => write!(f, "{}: {error}", Register::FIRMWARE),
+            Problem::WriteIgnored {
                 register,
                 found,
                 expected,
             } => write!(f, "{register} is {found} after {expected} was written"),
-            Problem::Position {
+            Problem::PositionMismatch {
                 feedback_rad,
                 register_rad,
             } => write!(

@@ -1,8 +1,9 @@
 //! Registers: their numbers, kinds and access, the frames that read and write them, and the replies.
 //!
-//! Reads and writes go to id 0x7FF with the motor's id in the payload; the reply comes with the motor's reply id and
-//! echoes the request. Without knowledge of the request a reply looks like feedback of a disabled motor, therefore
-//! [`RegisterReply::parse`] needs it. A write acts at once and is lost with the supply; nothing here stores it.
+//! Read and write requests have the id 0x7FF and the motor's id in the payload. The reply has the motor's reply id and
+//! repeats the request. A reply cannot be distinguished from feedback of a disabled motor without the request, therefore
+//! [`RegisterReply::parse`] needs the request. A write acts at once and is lost when the supply is switched off; this module
+//! cannot store it.
 
 use crate::frame::Frame;
 use core::fmt;
@@ -18,7 +19,7 @@ const FEEDBACK: u8 = 0xCC;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Register(pub u8);
 
-/// How a register's four bytes are read.
+/// Type of a register's four bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Unsigned integer.
@@ -29,19 +30,19 @@ pub enum Kind {
     Text,
 }
 
-/// Who may write a register.
+/// Access to a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// The motor alone.
+    /// Only the motor changes the register.
     ReadOnly,
-    /// An operator, and the start-up where its documentation states it.
+    /// The operator may write the register; start-up writes it only as documented there.
     Writable,
-    /// The motor would accept a write, but this program never sends one: ranges of the frames and the bit rate, with
-    /// which host and motor must agree, and registers whose write stores a zero in some firmware.
+    /// The motor accepts a write, but this program never sends one: ranges of the frames and bit rate, which must be equal in
+    /// host and motor, and registers whose write stores a zero position in some firmware.
     Forbidden,
 }
 
-/// What is known of a register.
+/// Properties of a register.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RegisterInfo {
     /// Number.
@@ -65,7 +66,7 @@ macro_rules! registers {
             )*
         }
 
-        /// All registers that every firmware from version 13 has, by number.
+        /// All registers that every firmware from version 13 on has, by number.
         pub const REGISTERS: &[RegisterInfo] = &[$(RegisterInfo {
             register: Register::$constant,
             name: $name,
@@ -117,13 +118,13 @@ registers! {
 }
 
 impl Register {
-    /// What is known of it.
+    /// Returns the properties of the register, if it is known.
     pub fn info(self) -> Option<&'static RegisterInfo> {
         REGISTERS.iter().find(|info| info.register == self)
     }
 
-    /// The register of this name, as in the maker's manuals; case does not matter.
-    pub fn named(name: &str) -> Option<&'static RegisterInfo> {
+    /// Finds the register with this name in the maker's manuals; ignores case.
+    pub fn by_name(name: &str) -> Option<&'static RegisterInfo> {
         REGISTERS
             .iter()
             .find(|info| info.name.eq_ignore_ascii_case(name))
@@ -151,7 +152,7 @@ pub enum Value {
 }
 
 impl Value {
-    /// Value of four bytes.
+    /// Decodes four bytes.
     pub const fn from_bytes(kind: Kind, bytes: [u8; 4]) -> Value {
         match kind {
             Kind::Integer => Value::Integer(u32::from_le_bytes(bytes)),
@@ -160,7 +161,7 @@ impl Value {
         }
     }
 
-    /// Its four bytes.
+    /// Encodes the value as four bytes.
     pub const fn to_bytes(self) -> [u8; 4] {
         match self {
             Value::Integer(value) => value.to_le_bytes(),
@@ -169,7 +170,7 @@ impl Value {
         }
     }
 
-    /// Its kind.
+    /// Returns the kind of the value.
     pub const fn kind(self) -> Kind {
         match self {
             Value::Integer(_) => Kind::Integer,
@@ -192,16 +193,16 @@ impl fmt::Display for Value {
     }
 }
 
-/// A write that this crate does not encode.
+/// Reason why this crate does not encode a write.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WriteError {
-    /// Unknown register.
+    /// The register is not known.
     Unknown(Register),
-    /// Read only, or never written by this program.
+    /// The register is read-only, or this program never writes it.
     NotWritable(Register),
-    /// A value of another kind than the register's.
+    /// The value is of another kind than the register.
     Kind(Register),
-    /// A value that is not finite.
+    /// The value is not finite.
     NotFinite(Register),
 }
 
@@ -218,15 +219,16 @@ impl fmt::Display for WriteError {
 
 impl core::error::Error for WriteError {}
 
-/// Asks the motor with `id` for a register.
+/// Creates the frame that reads a register of the motor with `id`.
 pub const fn read(id: u8, register: Register) -> Frame {
     Frame::of(BROADCAST, [id, 0, READ, register.0, 0, 0, 0, 0])
 }
 
-/// Writes a register of the motor with `id` until its supply is switched off.
+/// Creates the frame that writes a register of the motor with `id`. The motor keeps the value until its supply is switched
+/// off.
 ///
 /// # Errors
-/// [`WriteError`].
+/// [`WriteError`] with the reason.
 pub fn write(id: u8, register: Register, value: Value) -> Result<Frame, WriteError> {
     let info = register.info().ok_or(WriteError::Unknown(register))?;
     if info.access != Access::Writable {
@@ -242,12 +244,12 @@ pub fn write(id: u8, register: Register, value: Value) -> Result<Frame, WriteErr
     Ok(Frame::of(BROADCAST, [id, 0, WRITE, register.0, a, b, c, d]))
 }
 
-/// Asks the motor with `id` for its feedback, without a command. From firmware version 13 on.
-pub const fn ask_feedback(id: u8) -> Frame {
+/// Creates the frame that requests the feedback of the motor with `id` without a command; firmware version 13 or later.
+pub const fn request_feedback(id: u8) -> Frame {
     Frame::of(BROADCAST, [id, 0, FEEDBACK, 0, 0, 0, 0, 0])
 }
 
-/// What a register reply answers.
+/// Operation that a register reply answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Operation {
     /// A read.
@@ -261,7 +263,7 @@ pub enum Operation {
 pub struct RegisterReply {
     /// Register.
     pub register: Register,
-    /// Its four bytes.
+    /// Four bytes of the register.
     pub bytes: [u8; 4],
 }
 
@@ -285,7 +287,7 @@ impl RegisterReply {
         })
     }
 
-    /// The frame of the motor with `id`, which replies with `reply_id`.
+    /// Encodes the reply frame of the motor with `id`, which replies with `reply_id`.
     pub fn emit(&self, id: u8, reply_id: u16, operation: Operation) -> Frame {
         let code = match operation {
             Operation::Read => READ,
@@ -295,7 +297,7 @@ impl RegisterReply {
         Frame::of(reply_id, [id, 0, code, self.register.0, a, b, c, d])
     }
 
-    /// Value, by the register's kind; a register that is not known is an integer.
+    /// Decodes the value according to the register's kind; an unknown register is an integer.
     pub fn value(&self) -> Value {
         let kind = self.register.info().map_or(Kind::Integer, |info| info.kind);
         Value::from_bytes(kind, self.bytes)

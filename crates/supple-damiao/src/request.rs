@@ -1,15 +1,15 @@
-//! Frames as a motor reads them: everything that a host can send, the dangerous ones included.
+//! Frames as a motor decodes them: all frames that a host can send, including those that write flash.
 //!
-//! A motor compares the low eight bits of an id with its own; the bits above select the mode. Register frames have an
-//! id of their own and name the motor in their payload.
+//! A motor compares the low eight bits of an id with its own; the bits above select the mode. Register frames have a
+//! separate id and contain the motor's id in their payload.
 
 use crate::frame::Frame;
 use crate::mit::MitCodes;
 use crate::modes::{FORCE_POS, POS_VEL, VEL};
 use crate::register::{BROADCAST, Register};
-use crate::special::Special;
+use crate::special::SpecialCommand;
 
-/// What a frame asks of a motor.
+/// Request in a frame to a motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Request {
     /// Command of impedance mode.
@@ -18,11 +18,11 @@ pub enum Request {
     PositionVelocity(f32, f32),
     /// Speed \[rad/s\].
     Velocity(f32),
-    /// Position \[rad\] with limits of speed, 1/100 rad/s, and current, 1/10000 of the greatest.
+    /// Position \[rad\] with limits of the speed, in 1/100 rad/s, and of the current, in 1/10000 of the maximum.
     ForcePosition(f32, u16, u16),
     /// Enable, disable, clear error.
-    Special(Special),
-    /// Makes the present position the zero, in flash.
+    SpecialCommand(SpecialCommand),
+    /// Stores the present position as the zero position in flash.
     SetZero,
     /// Reads a register.
     Read(Register),
@@ -30,12 +30,12 @@ pub enum Request {
     Write(Register, [u8; 4]),
     /// Stores all registers in flash.
     StoreAll,
-    /// Asks for feedback.
+    /// Requests feedback.
     Feedback,
 }
 
 impl Request {
-    /// What `frame` asks of the motor with `id`; `None` if it is for another one, or malformed.
+    /// Decodes the request of `frame` to the motor with `id`; `None` if the frame is for another motor, or malformed.
     pub fn parse(frame: &Frame, id: u8) -> Option<Request> {
         if frame.id() == BROADCAST {
             return registers(frame.payload(), id);
@@ -46,9 +46,9 @@ impl Request {
         if let Some([0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, 0xFF, code @ 0xFB..=0xFE]) = frame.eight()
         {
             return Some(match code {
-                0xFB => Request::Special(Special::ClearError),
-                0xFC => Request::Special(Special::Enable),
-                0xFD => Request::Special(Special::Disable),
+                0xFB => Request::SpecialCommand(SpecialCommand::ClearError),
+                0xFC => Request::SpecialCommand(SpecialCommand::Enable),
+                0xFD => Request::SpecialCommand(SpecialCommand::Disable),
                 _ => Request::SetZero,
             });
         }
@@ -71,9 +71,9 @@ impl Request {
         }
     }
 
-    /// Whether a motor that obeys writes its flash memory.
+    /// Whether a motor that executes the request writes its flash memory.
     pub fn writes_flash(&self) -> bool {
-        // Firmware for four motors stores the zero on a write to the register of the motor's position.
+        // Firmware for four motors stores the zero position when the register of the motor's position is written.
         matches!(
             self,
             Request::SetZero | Request::StoreAll | Request::Write(Register::MOTOR_POSITION, _)

@@ -1,37 +1,37 @@
-//! Quantisation error of the torque, carried over to the next cycle: first-order noise shaping.
+//! First-order noise shaping of the torque: the quantisation error is carried over to the next cycle.
 //!
 //! ```text
 //! u[k] = round(torque[k] + e[k])      e[k+1] = torque[k] + e[k] - u[k]
 //! ```
 //!
-//! The sum of what was sent differs from the sum of what was wanted by at most half a step, at any time: over a second
-//! at 1 kHz the mean torque of an 8009 (step 26 mN m) is exact to 0.013 mN m. A constant torque of no code, zero among
-//! them, is sent as a pattern of its two neighbours.
+//! The sum of the sent torques differs from the sum of the requested torques by at most half a step at any time: over a
+//! second at 1 kHz, the mean torque of an 8009 (step 26 mN m) is exact to 0.013 mN m. A constant torque between two codes,
+//! such as zero, is sent as a pattern of these two codes.
 
 use crate::code::NotANumber;
 use crate::ranges::Ranges;
 
-/// The error of one motor's torque.
+/// Noise shaper of one motor's torque; holds the carried quantisation error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TorqueShaper {
     carried_nm: f64,
 }
 
 impl TorqueShaper {
-    /// Nothing carried.
+    /// Creates a shaper without carried error.
     pub const fn new() -> TorqueShaper {
         TorqueShaper { carried_nm: 0.0 }
     }
 
-    /// Error that the next cycle adds \[N m\], at most half a step.
+    /// Returns the error that the next cycle adds \[N m\], at most half a step.
     pub const fn carried_nm(&self) -> f64 {
         self.carried_nm
     }
 
-    /// The code of `torque_nm` \[N m\] with the carried error. A torque beyond the range saturates and carries nothing.
+    /// Encodes `torque_nm` \[N m\] plus the carried error. A torque outside the range saturates and carries no error.
     ///
     /// # Errors
-    /// [`NotANumber`]; the carried error is then dropped.
+    /// [`NotANumber`] for a torque that is not finite; the carried error is then dropped.
     pub fn encode(&mut self, torque_nm: f64, ranges: &Ranges) -> Result<u16, NotANumber> {
         let code = ranges.torque();
         let wanted_nm = torque_nm + self.carried_nm;

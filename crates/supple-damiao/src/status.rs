@@ -1,8 +1,8 @@
-//! The four bits of every feedback that report whether a motor has torque, and if not, why.
+//! Status of a motor: four bits of every feedback, which report whether the motor applies torque, or the reason why not.
 
 use core::fmt;
 
-/// State of a motor. Only [`Status::Enabled`] carries torque.
+/// Status of a motor. A motor applies torque only in [`Status::Enabled`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Status {
     /// 0: disabled.
@@ -28,7 +28,7 @@ pub enum Status {
 }
 
 impl Status {
-    /// All errors with a name.
+    /// All known errors.
     pub const ERRORS: [Status; 7] = [
         Status::OverVoltage,
         Status::UnderVoltage,
@@ -39,7 +39,7 @@ impl Status {
         Status::Overload,
     ];
 
-    /// State of a code; of a greater number the low four bits.
+    /// Converts the low four bits of a code.
     pub const fn from_code(code: u8) -> Status {
         match code & 0xF {
             0 => Status::Disabled,
@@ -71,7 +71,7 @@ impl Status {
         }
     }
 
-    /// Whether it is neither enabled nor disabled.
+    /// Whether the status is an error: neither enabled nor disabled.
     pub const fn is_error(self) -> bool {
         !matches!(self, Status::Enabled | Status::Disabled)
     }

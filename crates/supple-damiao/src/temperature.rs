@@ -1,16 +1,16 @@
-//! Temperature of a motor: warning, then a decreasing torque limit, then a fault.
+//! Temperature limits of a motor: with rising temperature first a warning, then a decreasing torque limit, then a fault.
 
-/// The three temperatures \[degrees Celsius\], ascending.
+/// Temperature limits for warning, derating and fault, ascending \[degrees Celsius\].
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Thermal {
+pub struct TemperatureLimits {
     warning_celsius: f64,
     derating_celsius: f64,
     fault_celsius: f64,
 }
 
-/// How hot a motor is.
+/// Temperature level of a motor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Heat {
+pub enum TemperatureLevel {
     /// Below the warning.
     Normal,
     /// At or above the warning.
@@ -21,36 +21,41 @@ pub enum Heat {
     Fault,
 }
 
-/// Share of the torque limit that is left just below the fault: an arm in most poses still carries itself.
+/// Fraction of the torque limit just below the fault temperature, with which an arm can still hold most poses.
 pub const MIN_SHARE: f64 = 0.5;
 
-impl Thermal {
-    /// From three temperatures; `None` unless they are finite and ascending.
-    pub fn new(warning_celsius: f64, derating_celsius: f64, fault_celsius: f64) -> Option<Thermal> {
+impl TemperatureLimits {
+    /// Creates the limits; returns `None` unless the temperatures are finite and ascending.
+    pub fn new(
+        warning_celsius: f64,
+        derating_celsius: f64,
+        fault_celsius: f64,
+    ) -> Option<TemperatureLimits> {
         let ascending = warning_celsius < derating_celsius && derating_celsius < fault_celsius;
         let finite = warning_celsius.is_finite() && fault_celsius.is_finite();
-        (ascending && finite).then_some(Thermal {
+        (ascending && finite).then_some(TemperatureLimits {
             warning_celsius,
             derating_celsius,
             fault_celsius,
         })
     }
 
-    /// How hot a motor of `celsius` is. A temperature of 0 is one that the motor has not measured yet, and is normal.
-    pub fn heat(&self, celsius: u8) -> Heat {
+    /// Returns the level of `celsius`. A temperature of 0 means that the motor has not measured it yet, and is normal.
+    pub fn heat(&self, celsius: u8) -> TemperatureLevel {
         let celsius = f64::from(celsius);
         if celsius >= self.fault_celsius {
-            Heat::Fault
+            TemperatureLevel::Fault
         } else if celsius >= self.derating_celsius {
-            Heat::Derating
+            TemperatureLevel::Derating
         } else if celsius >= self.warning_celsius {
-            Heat::Warning
+            TemperatureLevel::Warning
         } else {
-            Heat::Normal
+            TemperatureLevel::Normal
         }
     }
 
-    /// Share of the torque limit at `celsius`: 1 below derating, then falling linearly to [`MIN_SHARE`] at the fault.
+    /// Returns the allowed fraction of the torque limit at `celsius`: 1 below derating, decreasing linearly to [`MIN_SHARE`] at
+    /// the fault.
     pub fn torque_share(&self, celsius: u8) -> f64 {
         let above = f64::from(celsius) - self.derating_celsius;
         let range = self.fault_celsius - self.derating_celsius;

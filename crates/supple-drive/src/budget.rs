@@ -1,10 +1,10 @@
-//! Timing budget of a control period: the longest time of each frame on the bus, other times, and the rate that follows.
+//! Timing budget of a control period: maximum times of the frames on the bus, other times, and the maximum rate.
 
 use core::fmt;
 use supple_can_frame::BitRates;
 use supple_can_frame::timing::FrameLayout;
 
-/// Share of a period that a default rate leaves free.
+/// Fraction of a period in which the bus is free at the default rate.
 pub const SPARE_SHARE: f64 = 0.2;
 
 const NS_PER_S: u64 = 1_000_000_000;
@@ -14,17 +14,17 @@ const LINES: usize = 8;
 /// Frames of one kind in a period, or a time that is not on the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BudgetLine {
-    /// What they are.
+    /// Description of the frames or of the time.
     pub what: &'static str,
     /// Number of frames; one for a time that is not on the bus.
     pub count: u32,
-    /// Longest time of each \[ns\].
+    /// Maximum time of each frame \[ns\].
     pub each_ns: u64,
-    /// Whether the bus is busy meanwhile.
+    /// Whether the bus is busy during this time.
     pub on_bus: bool,
 }
 
-/// Time of a period, line by line.
+/// Times of a period, one line for each kind of frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
     rates: BitRates,
@@ -32,17 +32,17 @@ pub struct Budget {
     lines: [Option<BudgetLine>; LINES],
 }
 
-/// A period that is too short.
+/// Error: the period is too short.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Overload {
-    /// Times that must fit.
+    /// Times that must fit into the period.
     pub budget: Budget,
     /// Requested period \[ns\].
     pub period_ns: u64,
 }
 
 impl Budget {
-    /// An empty budget of an arm with `joints` motors.
+    /// Creates an empty budget of an arm with `joints` motors.
     pub fn new(rates: BitRates, joints: usize) -> Budget {
         Budget {
             rates,
@@ -85,7 +85,7 @@ impl Budget {
     fn line(mut self, line: BudgetLine) -> Budget {
         if line.count > 0 {
             let slot = self.lines.iter_mut().find(|slot| slot.is_none());
-            // A line that is left out would make the period look long enough.
+            // Without the line, a period that is too short would pass the check.
             assert!(slot.is_some(), "a budget has at most {LINES} lines");
             slot.into_iter().for_each(|slot| *slot = Some(line));
         }
@@ -127,8 +127,8 @@ impl Budget {
         NS_PER_S / self.min_period_ns().max(1)
     }
 
-    /// Largest of the standard rates \[Hz\] at which the bus is free for [`SPARE_SHARE`] of the period; `None` if there
-    /// is none.
+    /// Returns the largest standard rate \[Hz\] at which the bus is free for [`SPARE_SHARE`] of the period; `None` if the bus
+    /// is busier at every standard rate.
     pub fn default_rate_hz(&self) -> Option<u32> {
         const STANDARD_RATES_HZ: [u32; 8] = [1000, 800, 500, 400, 250, 200, 125, 100];
         let fits = |rate_hz: &u32| {
@@ -153,7 +153,7 @@ impl Budget {
         }))
     }
 
-    /// The budget as a table, for a period \[ns\] that may be too short.
+    /// Formats the budget as a table for a period \[ns\], which may be too short.
     pub fn display(&self, period_ns: u64) -> impl fmt::Display {
         Table {
             budget: *self,

@@ -1,14 +1,14 @@
-//! What a type of drives implements.
+//! The trait [`Drive`], which each type of drives implements.
 //!
 //! ```text
 //! request -> collect -> (published, answered, checked) -> operate -> send_torques -> lower -> poll -> drain
 //! ```
 //!
-//! Two shapes of a cycle fit: "request, receive, compute, send torques" (the request asks for positions and the torques go out at
-//! once), and "the torque is the question" (the request sends the torques of the previous cycle, whose replies carry
-//! the state; the torques given in this cycle wait for the next one).
+//! The trait supports two kinds of cycle. In the first, the request asks for positions, and the torques computed from them
+//! are sent in the same cycle. In the second, the request is the torque commands of the previous cycle, and the replies to
+//! them carry the state; the torques computed in this cycle are sent in the next one.
 //!
-//! Start-up is not part of the trait, because each type of drives needs its own settings: it ends with a value that
+//! Start-up is not part of the trait, because each type of drives needs its own settings. Start-up returns a value that
 //! implements the trait.
 
 use crate::budget::Budget;
@@ -18,16 +18,16 @@ use crate::loss::LossReason;
 use supple_core::Vector;
 use supple_core::nalgebra::Vector3;
 
-/// What an arm does when its motors are without torque.
+/// Behaviour of an arm whose motors apply no torque.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Rest {
+pub enum TorqueOffBehaviour {
     /// The motors brake: the arm sinks slowly.
     Brakes,
     /// The motors are free: the arm falls. It is laid down before the motors are disabled.
     Falls,
 }
 
-/// Force on the tip with its axes.
+/// Force on the tip, with the axes in which it is given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TipForce {
     /// In the axes of the tip \[N\].
@@ -50,15 +50,15 @@ pub struct Reading<const N: usize> {
 pub struct DriveState {
     /// Off, idle or active.
     pub drives: Drives,
-    /// Frames of the previous cycle were not sent.
+    /// Whether frames of the previous cycle were not sent.
     pub unsent: bool,
-    /// The interface is bus-off.
+    /// Whether the CAN interface is bus-off.
     pub bus_off: bool,
-    /// What the drives themselves report.
+    /// Loss that the drives report.
     pub loss: Option<LossReason>,
 }
 
-/// Counts since the start.
+/// Counters since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DriveCounters {
     /// Frames that the interface did not confirm.
@@ -73,53 +73,53 @@ pub struct DriveCounters {
 
 /// Times of a period that are reserved for the drives \[ns\].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Reserved {
-    /// Request and replies.
+pub struct ReservedTimes {
+    /// Time of the request and the replies.
     pub states_ns: u64,
-    /// Torques, after the controller's answer.
+    /// Time of the torques, after the controller's answer.
     pub torques_ns: u64,
 }
 
-/// How the drives end their torque.
+/// Way in which the drives end their torque.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Lower {
-    /// In the regular way: a safety module is asked for idle, motors without one are disabled.
+pub enum LoweringMode {
+    /// The safety module is set to idle; without a safety module, the motors are disabled.
     Regular,
-    /// Also directly at the motors, because the regular way took too long.
+    /// The motors are also set to idle directly, because the regular way took too long.
     Forced,
 }
 
-/// A type of drives with its bus, ready for the cycle. Nothing in it may allocate, lock or log.
+/// Drives of one type, with their bus, after start-up. An implementation may not allocate memory, take locks or write logs.
 pub trait Drive<const N: usize> {
     /// Time of the drives \[ns\]: monotonic, with an arbitrary origin.
     fn now_ns(&self) -> u64;
 
-    /// The machine's monotonic clock at a time of the drives \[ns\].
+    /// Converts a time of the drives to the machine's monotonic clock \[ns\].
     fn monotonic_ns(&self, time_ns: u64) -> u64 {
         time_ns
     }
 
-    /// Total time for which the drives' clock was fallen behind the monotonic clock \[ns\].
+    /// Total time for which the clock of the drives was paused relative to the monotonic clock \[ns\].
     fn clock_stall_ns(&self) -> u64 {
         0
     }
 
-    /// What the arm does without torque.
-    fn rest(&self) -> Rest;
+    /// Returns what the arm does without torque.
+    fn torque_off_behaviour(&self) -> TorqueOffBehaviour;
 
     /// Times of a period that the drives need \[ns\].
-    fn reserved(&self) -> Reserved;
+    fn reserved(&self) -> ReservedTimes;
 
     /// Frames of a period with their times on the bus.
     fn budget(&self) -> Budget;
 
-    /// Opens a cycle: asks for the states of the motors.
+    /// Begins a cycle: requests the states of the motors.
     ///
     /// # Errors
     /// If the bus itself fails.
     fn request(&mut self) -> Result<(), LoopError>;
 
-    /// Collects the replies until all are there or `until_ns`. Returns a bit mask of the motors that did not reply;
+    /// Receives the replies until all have arrived or `until_ns` is reached. Returns a bit mask of the motors that did not reply;
     /// zero if the request itself was not sent.
     ///
     /// # Errors
@@ -132,15 +132,14 @@ pub trait Drive<const N: usize> {
     /// State of the drives.
     fn state(&self) -> DriveState;
 
-    /// What an operator's switch does elsewhere, once per cycle: drives without one become active if that is `allowed`, a
-    /// controller in gravity hold requests torque, and no loss is latched. Returns whether they became active in this
-    /// call.
+    /// Activates drives that have no operator's switch, once per cycle. They become active if this is `allowed`, a controller
+    /// in gravity hold requests torque, and no loss is latched. Returns whether they became active in this call.
     fn operate(&mut self, command: Option<&Command<N>>, allowed: bool) -> bool {
         let _ = (command, allowed);
         false
     }
 
-    /// Sends joint torques \[N m\], with the damping that the motors add themselves \[N m s/rad\].
+    /// Sends joint torques \[N m\], and the damping that the motors add themselves \[N m s/rad\].
     ///
     /// # Errors
     /// If the bus itself fails.
@@ -150,14 +149,14 @@ pub trait Drive<const N: usize> {
         damping_nm_s_per_rad: &Vector<N>,
     ) -> Result<(), LoopError>;
 
-    /// Ends the torque, for this reason. Called in every cycle until the drives are idle.
+    /// Ends the torque, for this reason. The plant loop calls it in every cycle until the drives are idle.
     ///
     /// # Errors
     /// If the bus itself fails.
-    fn lower(&mut self, how: Lower, reason: LossReason) -> Result<(), LoopError>;
+    fn lower(&mut self, how: LoweringMode, reason: LossReason) -> Result<(), LoopError>;
 
-    /// Asks for something less urgent, if its replies fit before `next_period_ns`; `lowering` is set while the torque is
-    /// being ended.
+    /// Sends an auxiliary poll, if its replies fit before `next_period_ns`; `lowering` is set while the torque is being
+    /// ended.
     ///
     /// # Errors
     /// If the bus itself fails.
@@ -166,7 +165,7 @@ pub trait Drive<const N: usize> {
         Ok(())
     }
 
-    /// Ends a cycle: receives until `next_period_ns`; what was not sent by then counts as lost.
+    /// Ends a cycle: receives until `next_period_ns`; a frame that was not sent by then counts as lost.
     ///
     /// # Errors
     /// If the bus itself fails.

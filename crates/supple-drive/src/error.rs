@@ -2,16 +2,16 @@
 
 use supple_bus::BusError;
 
-/// The loop cannot continue. What happens on a bus, or to a motor, is no error: the guard handles it.
+/// Error: the plant loop cannot continue. A fault on the bus or of a motor is not such an error: the guard handles it.
 #[derive(Debug, thiserror::Error)]
 pub enum LoopError {
-    /// The bus itself.
+    /// The bus itself failed.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// The link to the controller.
+    /// The link to the controller failed.
     #[error("shared memory: {0}")]
     Link(Box<dyn std::error::Error + Send + Sync>),
-    /// The drives, for a reason of their own.
+    /// The drives failed for a reason that only their type has.
     #[error(transparent)]
     Drive(Box<dyn std::error::Error + Send + Sync>),
 }

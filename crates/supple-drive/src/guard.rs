@@ -1,36 +1,39 @@
-//! State machine of the safe action: which torque is sent, and when the drives end it, after a loss.
+//! State machine of the safe action: decides after a loss which torque is sent and when the drives end it.
 //!
 //! ```text
 //! resting --(drives active, controller requests torque)--> active
 //! arms whose motors brake without torque:
 //!   active --(loss, or the controller requests none)--> lowering --(drives idle, or 100 ms)--> resting
 //! arms that fall without torque:
-//!   active --(the same)--> holding --(a time)--> stowing --(the arm lies)--> lowering --> resting
-//!   holding or stowing --(that torque drives the arm)--> damping --(rest, 10 s, or damping drives it)--> lowering --> resting
+//!   active --(the same)--> holding --(hold time)--> stowing --(the arm lies)--> lowering --> resting
+//!   holding or stowing --(overspeed)--> damping --(standstill, 10 s, or runaway)--> lowering --> resting
 //! ```
 //!
-//! Torques are sent in the active stage and also in the resting stage, in which idle motors ignore them, so that
-//! the weight of the arm is compensated from the moment it is activated. While the answer is missing, the fallback
-//! torque is sent from the first cycle on. After [`ANSWER_TIMEOUT_NS`] the drives are lowered, and the motors brake;
-//! the fallback continues until they do, for at most [`FALLBACK_NS`], because the arm would drop without torque before
-//! the motors brake. What a loss permits is in [`LossReason::safe_action`]. An arm that falls is first held by gravity
-//! compensation and the damping of its motors, then laid down, then disabled. If that torque drives the arm, because an
-//! angle is wrong, the motors damp without any torque: what they do then takes energy from the arm; if it does not, as of a motor
-//! that turns the wrong way altogether, they are disabled. With a motor that has
-//! no torque the arm is held in any case: its joint falls, and moves the others. The machine never activates the arm. It
-//! has no access to bus or clock: time is an argument.
+//! The loop sends torques in the active stage. It also sends them in the resting stage, in which idle motors ignore them, so
+//! that the weight of the arm is compensated from the moment the operator activates it. While an answer is missing, the
+//! loop sends the fallback torque, from the first cycle on. After [`ANSWER_TIMEOUT_NS`] it ends the torque of the drives.
+//! The fallback torque continues until the motors brake, for at most [`FALLBACK_NS`], because the arm would drop between
+//! the end of the torque and the start of braking. [`LossReason::safe_action`] gives the losses after which this is
+//! allowed.
+//!
+//! An arm that falls without torque is first held by gravity compensation and the damping of its motors, then laid down,
+//! then disabled. If an angle is wrong, this torque may accelerate the arm; the motors then damp without torque, which
+//! takes energy from the arm. If damping does not slow the arm, as with a motor whose direction is reversed, the motors are
+//! disabled. If one motor has no torque, the others hold the arm even if a joint is too fast: the joint of that motor
+//! falls and moves the others. The state machine never activates the arm. It has no access to bus or clock: time is an
+//! argument.
 
-use crate::drive::Rest;
+use crate::drive::TorqueOffBehaviour;
 use crate::link::Drives;
 use crate::loss::LossReason;
 
-/// Time for which answers or transmissions may fail before the drives are lowered \[ns\].
+/// Time for which answers or transmissions may fail before the torque is ended \[ns\].
 pub const ANSWER_TIMEOUT_NS: u64 = 10_000_000;
-/// Maximum time of the fallback torque while the drives are lowered \[ns\].
+/// Maximum time of the fallback torque while the torque is being ended \[ns\].
 pub const FALLBACK_NS: u64 = 100_000_000;
 /// Maximum time for which motors damp without torque before they are disabled \[ns\].
 const DAMPING_NS: u64 = 10_000_000_000;
-/// Consecutive cycles in which a motor may miss its reply; in the next one its encoder counts as lost.
+/// Number of consecutive cycles in which the reply of a motor may be missing; in the next cycle its encoder counts as lost.
 const TOLERATED_MISSED_REPLIES: u32 = 1;
 
 /// Observations of one cycle.
@@ -40,22 +43,22 @@ pub struct GuardInput {
     pub now_ns: u64,
     /// Whether the controller's answer requests torque; `None` without an answer.
     pub answer: Option<bool>,
-    /// Verdict of the drive guard, if it ended the torque.
+    /// Loss for which the drive guard rejected the command.
     pub drive_guard_loss: Option<LossReason>,
-    /// The torque with which the loop holds the arm or lays it down drives it.
+    /// Loss if a joint exceeds its speed limit while the loop holds the arm or lays it down.
     pub hold_loss: Option<LossReason>,
     /// Bit `i` is set if motor `i` did not reply although the request was sent.
     pub missing: u8,
-    /// Frames of the previous cycle were not sent.
+    /// Whether frames of the previous cycle were not sent.
     pub unsent: bool,
-    /// The interface is bus-off.
+    /// Whether the CAN interface is bus-off.
     pub bus_off: bool,
     /// Last known state of the drives.
     pub drives: Drives,
-    /// What the drives themselves report.
+    /// Loss that the drives report.
     pub drive_loss: Option<LossReason>,
-    /// The program is about to end.
-    pub leaving: bool,
+    /// Whether the program is shutting down.
+    pub shutting_down: bool,
 }
 
 /// Torque that a cycle sends.
@@ -63,11 +66,11 @@ pub struct GuardInput {
 pub enum Torque {
     /// The command of this cycle.
     Command,
-    /// The fallback of the last command.
+    /// The fallback torque of the last command.
     Fallback,
-    /// Gravity compensation of the loop itself, with the damping of the motors.
+    /// Gravity compensation that the loop computes, with the damping of the motors.
     Hold,
-    /// As [`Torque::Hold`], towards the rest pose.
+    /// As [`Torque::Hold`], with a spring towards the rest pose.
     Stow,
     /// Zero, with the damping of the motors.
     Damp,
@@ -80,13 +83,13 @@ pub enum Torque {
 pub struct Action {
     /// Torque to send.
     pub torque: Torque,
-    /// End the torque in the regular way.
+    /// Whether to end the torque.
     pub lower: bool,
-    /// End it directly at the motors, because the regular way took too long.
+    /// Whether to end it also by setting the motors to idle directly, because the regular way took too long.
     pub idle_motors: bool,
 }
 
-/// State of the state machine.
+/// State of the safe action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stage {
     /// The motors brake, or the arm lies.
@@ -95,9 +98,9 @@ pub enum Stage {
     Active,
     /// An arm that falls without torque is held: the reason, and since when \[ns\].
     Holding(LossReason, u64),
-    /// It is laid down: the reason, and since when \[ns\].
+    /// An arm that falls without torque is laid down: the reason, and since when \[ns\].
     Stowing(LossReason, u64),
-    /// Its motors damp without torque: the reason, and since when \[ns\].
+    /// The motors of an arm that falls damp without torque: the reason, and since when \[ns\].
     Damping(LossReason, u64),
     /// The torque is being ended: the reason, and since when \[ns\].
     Lowering(LossReason, u64),
@@ -106,16 +109,17 @@ pub enum Stage {
 /// State machine of the safe action.
 #[derive(Clone, Copy, Debug)]
 pub struct SafeActionMachine {
-    rest: Rest,
+    torque_off_behaviour: TorqueOffBehaviour,
     /// Time for which an arm that falls is held before it is laid down \[ns\].
     hold_ns: u64,
     stage: Stage,
-    /// Times at which answers and transmissions began to fail \[ns\].
+    /// Time since which answers are missing \[ns\].
     unanswered_ns: Option<u64>,
+    /// Time since which transmissions fail \[ns\].
     unsent_ns: Option<u64>,
     missing: [u32; 8],
-    /// A motor has no torque since the loss.
-    motor_ended: bool,
+    /// Whether a motor has no torque since the loss.
+    motor_without_torque: bool,
     last_loss: Option<(LossReason, u64)>,
 }
 
@@ -126,24 +130,24 @@ impl Default for SafeActionMachine {
 }
 
 impl SafeActionMachine {
-    /// A machine of drives that brake without torque, in the resting stage, without a loss.
+    /// Creates the state machine of an arm whose motors brake without torque, in the resting stage.
     pub const fn new() -> SafeActionMachine {
         SafeActionMachine {
-            rest: Rest::Brakes,
+            torque_off_behaviour: TorqueOffBehaviour::Brakes,
             hold_ns: 0,
             stage: Stage::Resting,
             unanswered_ns: None,
             unsent_ns: None,
             missing: [0; 8],
-            motor_ended: false,
+            motor_without_torque: false,
             last_loss: None,
         }
     }
 
-    /// A machine of an arm that falls without torque, which is held for `hold_ns` before it is laid down.
+    /// Creates the state machine of an arm that falls without torque; the loop holds it for `hold_ns` before laying it down.
     pub const fn falling(hold_ns: u64) -> SafeActionMachine {
         SafeActionMachine {
-            rest: Rest::Falls,
+            torque_off_behaviour: TorqueOffBehaviour::Falls,
             hold_ns,
             ..SafeActionMachine::new()
         }
@@ -154,7 +158,7 @@ impl SafeActionMachine {
         self.stage
     }
 
-    /// The last loss that ended normal operation, with its time \[ns\].
+    /// Returns the last loss that ended normal operation, with its time \[ns\].
     pub fn last_loss(&self) -> Option<(LossReason, u64)> {
         self.last_loss
     }
@@ -163,32 +167,35 @@ impl SafeActionMachine {
     pub fn holds(&self) -> bool {
         match self.stage {
             Stage::Holding(..) | Stage::Stowing(..) | Stage::Damping(..) => true,
-            Stage::Lowering(..) => self.rest == Rest::Falls,
+            Stage::Lowering(..) => self.torque_off_behaviour == TorqueOffBehaviour::Falls,
             Stage::Resting | Stage::Active => false,
         }
     }
 
-    /// Runs one cycle. `lies` is whether an arm that is being laid down has arrived, or one that is damped is at rest or is not slowed.
+    /// Runs one cycle. `lies` is whether an arm that is being laid down has arrived, or whether an arm that is damped stands
+    /// still or is not slowed.
     pub fn cycle(&mut self, input: &GuardInput, lies: bool) -> Action {
-        let loss = self.watch(input);
+        let loss = self.most_severe_loss(input);
         let active = input.drives == Drives::Active;
-        self.motor_ended |= loss.is_some_and(LossReason::ends_a_motor);
-        let hold_loss = input.hold_loss.filter(|_| !self.motor_ended);
+        self.motor_without_torque |= loss.is_some_and(LossReason::leaves_a_motor_without_torque);
+        let hold_loss = input.hold_loss.filter(|_| !self.motor_without_torque);
         match self.stage {
             Stage::Resting if active && loss.is_none() => self.stage = Stage::Active,
             Stage::Resting if active => {
-                // The arm was activated while a loss is present: it is lowered again at once.
-                self.lose(loss.unwrap_or(LossReason::Answer), input.now_ns);
+                // The arm was activated while a loss is present: its torque is ended at once.
+                self.begin_safe_action(loss.unwrap_or(LossReason::NoAnswer), input.now_ns);
             }
             Stage::Active => {
-                if let Some(loss) = loss.filter(|_| active || self.rest == Rest::Falls) {
-                    self.lose(loss, input.now_ns);
+                if let Some(loss) = loss
+                    .filter(|_| active || self.torque_off_behaviour == TorqueOffBehaviour::Falls)
+                {
+                    self.begin_safe_action(loss, input.now_ns);
                 } else if !active {
                     self.stage = Stage::Resting;
                 }
             }
-            // Motors of an arm that falls may be lost one after another: the others go on. Without an active motor there is
-            // nothing to hold.
+            // An arm that falls may lose its motors one after another: the remaining motors continue. Without an active motor the
+            // arm cannot be held.
             Stage::Holding(..) | Stage::Stowing(..) | Stage::Damping(..) if !active => {
                 self.stage = Stage::Resting;
             }
@@ -213,7 +220,7 @@ impl SafeActionMachine {
             }
             Stage::Lowering(..) if !active => self.stage = Stage::Resting,
             Stage::Lowering(before, since_ns) => {
-                // A lost encoder, or motion that does not stop, ends the fallback too.
+                // A lost encoder, or motion that does not stop, also ends the fallback torque.
                 let worse = loss.filter(|loss| !loss.safe_action().gravity);
                 self.stage = Stage::Lowering(worse.unwrap_or(before), since_ns);
             }
@@ -239,10 +246,12 @@ impl SafeActionMachine {
             Stage::Damping(..) => only(Torque::Damp),
             Stage::Lowering(loss, since_ns) => {
                 let overdue = input.now_ns >= since_ns + FALLBACK_NS;
-                let torque = match self.rest {
-                    Rest::Falls => Torque::None,
-                    Rest::Brakes if !overdue && loss.safe_action().gravity => Torque::Fallback,
-                    Rest::Brakes => Torque::None,
+                let torque = match self.torque_off_behaviour {
+                    TorqueOffBehaviour::Falls => Torque::None,
+                    TorqueOffBehaviour::Brakes if !overdue && loss.safe_action().gravity => {
+                        Torque::Fallback
+                    }
+                    TorqueOffBehaviour::Brakes => Torque::None,
                 };
                 Action {
                     torque,
@@ -253,12 +262,12 @@ impl SafeActionMachine {
         }
     }
 
-    fn lose(&mut self, loss: LossReason, now_ns: u64) {
-        self.stage = match self.rest {
-            Rest::Brakes => Stage::Lowering(loss, now_ns),
-            Rest::Falls => Stage::Holding(loss, now_ns),
+    fn begin_safe_action(&mut self, loss: LossReason, now_ns: u64) {
+        self.stage = match self.torque_off_behaviour {
+            TorqueOffBehaviour::Brakes => Stage::Lowering(loss, now_ns),
+            TorqueOffBehaviour::Falls => Stage::Holding(loss, now_ns),
         };
-        self.motor_ended = loss.ends_a_motor();
+        self.motor_without_torque = loss.leaves_a_motor_without_torque();
         self.last_loss = Some((loss, now_ns));
     }
 
@@ -269,7 +278,7 @@ impl SafeActionMachine {
     }
 
     /// Returns the most severe loss that has lasted longer than its tolerance.
-    fn watch(&mut self, input: &GuardInput) -> Option<LossReason> {
+    fn most_severe_loss(&mut self, input: &GuardInput) -> Option<LossReason> {
         for (index, count) in self.missing.iter_mut().enumerate() {
             *count = if input.missing >> index & 1 == 1 {
                 count.saturating_add(1)
@@ -288,7 +297,7 @@ impl SafeActionMachine {
         let unsent = since(&mut self.unsent_ns, input.unsent);
         let mut counts = self.missing.iter();
         if let Some(index) = counts.position(|count| *count > TOLERATED_MISSED_REPLIES) {
-            return Some(LossReason::Encoder(index));
+            return Some(LossReason::EncoderLost(index));
         }
         let severe = |loss: &LossReason| !loss.safe_action().gravity;
         if let Some(loss) = input.drive_loss.filter(severe) {
@@ -301,20 +310,20 @@ impl SafeActionMachine {
             return Some(LossReason::BusOff);
         }
         if unsent {
-            return Some(LossReason::Transmit);
+            return Some(LossReason::NotTransmitted);
         }
-        if input.leaving {
-            return Some(LossReason::Leaving);
+        if input.shutting_down {
+            return Some(LossReason::ShuttingDown);
         }
         if unanswered {
-            return Some(LossReason::Answer);
+            return Some(LossReason::NoAnswer);
         }
         if input.answer == Some(false) {
-            // Motors that carry their state in the reply to their torque are lost to the controller with the frames: it
-            // wants no torque before the transmission has failed for long.
-            let cause = self.rest == Rest::Falls && input.unsent;
+            // If motors send their state in the reply to a torque command, frames that are not sent also leave the controller
+            // without states: it requests no torque before the transmission timeout has passed.
+            let cause = self.torque_off_behaviour == TorqueOffBehaviour::Falls && input.unsent;
             return Some(match cause {
-                true => LossReason::Transmit,
+                true => LossReason::NotTransmitted,
                 false => LossReason::TorqueNotWanted,
             });
         }

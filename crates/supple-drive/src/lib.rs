@@ -1,12 +1,12 @@
-//! The plant loop: what every drive of an arm has in common.
+//! The plant loop, which is the same for every type of drives.
 //!
-//! [`PlantLoop`] runs one cycle per period: it asks the drives for the joint angles, publishes the arm's state, waits
-//! a bounded time for the controller's torques, passes them through the guards and hands them to the drives. A make
-//! of drives is one implementation of [`Drive`]: Barrett's pucks and Damiao motors on a bus, or a simulated arm. What
-//! happens after a loss is one table for all of them ([`LossReason::safe_action`]) and one state machine
+//! [`PlantLoop`] runs one cycle per period: it requests the joint angles from the drives, publishes the arm's state,
+//! waits a bounded time for the controller's torques, checks them with the guards and gives them to the drives. Each type
+//! of drives implements [`Drive`]: Barrett's pucks and Damiao motors on a bus, or a simulated arm. For all types, the safe
+//! action after a loss is defined by one table ([`LossReason::safe_action`]) and one state machine
 //! ([`SafeActionMachine`]).
 //!
-//! The loop does not depend on the controller, which it reaches through a [`Link`], and has no protocol. Time is
+//! The loop communicates with the controller through a [`Link`] and depends on no protocol of drives. Time is
 //! the drives' time ([`Drive::now_ns`]): the same code runs on a CAN card, on an emulator, and in virtual time. A
 //! cycle allocates no memory, takes no lock and writes no log.
 
@@ -27,7 +27,10 @@ mod stow;
 mod unconfirmed;
 
 pub use budget::{Budget, BudgetLine, Overload, SPARE_SHARE};
-pub use drive::{Drive, DriveCounters, DriveState, Lower, Reading, Reserved, Rest, TipForce};
+pub use drive::{
+    Drive, DriveCounters, DriveState, LoweringMode, Reading, ReservedTimes, TipForce,
+    TorqueOffBehaviour,
+};
 pub use error::LoopError;
 pub use guard::{
     ANSWER_TIMEOUT_NS, Action, FALLBACK_NS, GuardInput, SafeActionMachine, Stage, Torque,

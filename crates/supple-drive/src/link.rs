@@ -1,4 +1,4 @@
-//! Interface between the plant loop and the controller, independent of the transport.
+//! Interface between the plant loop and the controller, for any transport.
 
 use crate::error::LoopError;
 use supple_core::Vector;
@@ -9,14 +9,14 @@ use supple_core::nalgebra::Vector3;
 /// State of the drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drives {
-    /// Without power: emergency stop.
+    /// The motors have no power: emergency stop.
     Off,
     /// The motors brake and ignore torques.
     Idle,
     /// The motors apply torques.
     Active,
-    /// The motors have torque that the plant loop commands: it holds an arm that falls without torque, or lays it down.
-    /// The controller's torques are not applied.
+    /// The motors apply torques of the plant loop, which holds an arm that falls without torque, or lays it down. The
+    /// controller's torques are not applied.
     Held,
 }
 
@@ -81,13 +81,13 @@ pub struct Command<const N: usize> {
     pub torque_nm: Vector<N>,
     /// Joint torques to send while answers are missing \[N m\].
     pub fallback_torque_nm: Vector<N>,
-    /// Apply the torques; otherwise switch the motors to idle.
+    /// Whether to apply the torques; otherwise the motors are set to idle.
     pub wants_torque: bool,
     /// The controller's mode, if known.
     pub mode: Option<Mode>,
-    /// The controller is in a fault.
+    /// Whether the controller is in a fault.
     pub fault: bool,
-    /// Numbers of mode and fault as in the message, for a trace.
+    /// Codes of mode and fault in the message of the controller, for a trace.
     pub codes: [u8; 2],
 }
 
@@ -105,7 +105,7 @@ impl<const N: usize> Command<N> {
 /// Result of waiting for an answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer<const N: usize> {
-    /// The answer to this cycle.
+    /// The answer to this cycle, if it arrived in time.
     pub command: Option<Command<N>>,
     /// Number of answers to earlier cycles, which are discarded.
     pub late: u64,
@@ -125,8 +125,7 @@ pub trait Link<const N: usize> {
     /// If the transport fails. A missing controller is not an error.
     fn publish(&mut self, report: &ArmReport<N>) -> Result<(), LoopError>;
 
-    /// Waits for the answer to a cycle, at most for `wait_ns`; in virtual time bus time does not advance
-    /// meanwhile.
+    /// Waits for the answer to a cycle, for at most `wait_ns`. In virtual time, bus time does not advance during the wait.
     ///
     /// # Errors
     /// If the transport fails. A missing controller is not an error.

@@ -1,43 +1,43 @@
-//! Losses that end normal operation, and the one table of what follows.
+//! The losses that end normal operation, and the safe action after each of them.
 //!
-//! | loss | motors that brake without torque | arm that falls without torque |
+//! | loss | arm whose motors brake without torque | arm that falls without torque |
 //! |---|---|---|
-//! | no answer, no torque wanted, transmission, bus-off, safety module, leaving, activated by mistake | gravity at the last pose until they brake | held, laid down, disabled |
-//! | a lost encoder, a faulty motor | no torque | the other motors: held, laid down, disabled |
-//! | overspeed, no stop in a fault of the controller | no torque | the same |
-//! | the torque of holding drives the arm | - | the motors damp without torque, then are disabled |
+//! | no answer, no torque requested, frames not sent, bus-off, silent safety module, shutdown, activation outside gravity hold | gravity torque at the last pose until the motors brake | is held, laid down, then disabled |
+//! | lost encoder, faulty motor | no torque | the other motors hold the arm and lay it down, then are disabled |
+//! | overspeed, no stop in a fault of the controller | no torque | is held, laid down, then disabled |
+//! | overspeed while the arm is held | - | the motors damp without torque, then are disabled |
 
 use core::fmt;
 use supple_core::controller::{JointLabel, NamesJoints};
 use supple_core::drive_guard::GuardReason;
 use supple_core::record::Text;
 
-/// What a motor reports about itself.
+/// Fault of a motor, as the motor reports it or its replies show it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MotorFault {
-    /// It is disabled although it was enabled and nobody disabled it.
+    /// The motor is disabled although the host did not disable it.
     Disabled,
-    /// Its supply voltage is too high.
+    /// The supply voltage is too high.
     OverVoltage,
-    /// Its supply voltage is too low.
+    /// The supply voltage is too low.
     UnderVoltage,
-    /// Its current is too high.
+    /// The motor current is too high.
     OverCurrent,
-    /// Its driver is too hot.
+    /// The motor driver is too hot.
     HotDriver,
-    /// Its winding is too hot.
+    /// The winding is too hot.
     HotWinding,
-    /// It is hotter than the arm allows.
+    /// The motor is above the temperature limit in the arm's TOML.
     Hot,
-    /// It received no command in time.
+    /// The motor's watchdog received no command in time.
     CommunicationLost,
-    /// It is overloaded.
+    /// The motor is overloaded.
     Overload,
-    /// Its position jumped farther than it can turn.
+    /// The reported position changed by more than the motor can turn in one cycle.
     PositionJump,
-    /// Two motors answer with its id.
+    /// Two motors reply with the same id.
     TwoMotors,
-    /// A code that its protocol does not define.
+    /// The motor reports a status code that the protocol does not define.
     Unknown(u8),
 }
 
@@ -54,46 +54,46 @@ impl fmt::Display for MotorFault {
             MotorFault::CommunicationLost => "reports that commands were missing",
             MotorFault::Overload => "reports overload",
             MotorFault::PositionJump => "reports a position that jumped farther than it can turn",
-            MotorFault::TwoMotors => "has an id that two motors answer to",
+            MotorFault::TwoMotors => "shares its id with another motor; two motors reply",
             MotorFault::Unknown(code) => return write!(f, "reports unknown code {code:#x}"),
         })
     }
 }
 
-/// Reason for which normal operation ended.
+/// Reason why normal operation ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LossReason {
     /// The controller did not answer.
-    Answer,
+    NoAnswer,
     /// The controller requests no torque.
     TorqueNotWanted,
-    /// A joint is at twice its speed limit; its index.
+    /// The joint of this index moves at twice its speed limit.
     Overspeed(usize),
-    /// A joint does not stop although the controller is in a fault; its index.
+    /// The joint of this index does not stop although the controller is in a fault.
     NotStopped(usize),
-    /// A joint exceeds its speed limit while the plant loop holds the arm or lays it down; its index.
-    HoldDrives(usize),
+    /// The joint of this index exceeds its speed limit while the plant loop holds the arm or lays it down.
+    OverspeedInHold(usize),
     /// The motors were activated while the controller was not in gravity hold.
-    Activated,
-    /// A motor did not reply; its index.
-    Encoder(usize),
-    /// A motor reports a fault; its index.
+    ActivatedOutsideGravityHold,
+    /// The motor of this index did not reply.
+    EncoderLost(usize),
+    /// The motor of this index has a fault.
     Motor(usize, MotorFault),
     /// Frames were not sent.
-    Transmit,
+    NotTransmitted,
     /// The controller of the CAN interface is bus-off.
     BusOff,
     /// The safety module did not answer.
-    Module,
-    /// This program is about to end.
-    Leaving,
+    SafetyModuleSilent,
+    /// The program is shutting down.
+    ShuttingDown,
 }
 
 impl NamesJoints for LossReason {
     fn write(&self, f: &mut fmt::Formatter<'_>, names: &[Text]) -> fmt::Result {
         let label = |joint: usize| JointLabel::new(joint, names);
         match *self {
-            LossReason::Answer => f.write_str("the controller did not answer"),
+            LossReason::NoAnswer => f.write_str("the controller did not answer"),
             LossReason::TorqueNotWanted => f.write_str("the controller requests no torque"),
             LossReason::Overspeed(joint) => {
                 write!(f, "{} moves at twice its speed limit", label(joint))
@@ -103,22 +103,22 @@ impl NamesJoints for LossReason {
                 "{} does not stop although the controller is in a fault",
                 label(joint)
             ),
-            LossReason::HoldDrives(joint) => write!(
+            LossReason::OverspeedInHold(joint) => write!(
                 f,
                 "{} exceeds its speed limit while the arm is held: an angle is wrong",
                 label(joint)
             ),
-            LossReason::Activated => f.write_str(
+            LossReason::ActivatedOutsideGravityHold => f.write_str(
                 "the motors were activated while the controller was not in gravity hold",
             ),
-            LossReason::Encoder(index) => {
+            LossReason::EncoderLost(index) => {
                 write!(f, "motor {} did not reply in two cycles", index + 1)
             }
             LossReason::Motor(index, fault) => write!(f, "motor {} {fault}", index + 1),
-            LossReason::Transmit => f.write_str("the CAN interface does not send its frames"),
+            LossReason::NotTransmitted => f.write_str("the CAN interface does not send its frames"),
             LossReason::BusOff => f.write_str("the CAN interface is bus-off"),
-            LossReason::Module => f.write_str("the safety module does not answer"),
-            LossReason::Leaving => f.write_str("the program is shutting down"),
+            LossReason::SafetyModuleSilent => f.write_str("the safety module does not answer"),
+            LossReason::ShuttingDown => f.write_str("the program is shutting down"),
         }
     }
 }
@@ -129,19 +129,19 @@ impl fmt::Display for LossReason {
     }
 }
 
-/// What the drives do after a loss: a row of the table.
+/// What the drives do after a loss.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SafeAction {
-    /// Gravity compensation continues until the motors brake. On an arm that falls without torque it continues in
-    /// any case, with damping, as far as the motors can.
+    /// Whether gravity compensation continues until the motors brake. Only for arms whose motors brake without torque: on an
+    /// arm that falls without torque it always continues, with damping, as far as the motors can apply it.
     pub gravity: bool,
 }
 
 impl LossReason {
-    /// Whether a motor has no torque any more, so that its joint moves as it likes.
-    pub const fn ends_a_motor(self) -> bool {
+    /// Whether the loss leaves a motor without torque, so that its joint moves freely.
+    pub const fn leaves_a_motor_without_torque(self) -> bool {
         match self {
-            LossReason::Encoder(_) => true,
+            LossReason::EncoderLost(_) => true,
             LossReason::Motor(_, fault) => !matches!(
                 fault,
                 MotorFault::Hot | MotorFault::PositionJump | MotorFault::TwoMotors
@@ -150,22 +150,22 @@ impl LossReason {
         }
     }
 
-    /// The table of safe actions, for every drive.
+    /// Returns the safe action after this loss, for every type of drives.
     pub const fn safe_action(self) -> SafeAction {
         let gravity = match self {
-            LossReason::Answer
+            LossReason::NoAnswer
             | LossReason::TorqueNotWanted
-            | LossReason::Activated
-            | LossReason::Transmit
+            | LossReason::ActivatedOutsideGravityHold
+            | LossReason::NotTransmitted
             | LossReason::BusOff
-            | LossReason::Module
-            | LossReason::Leaving => true,
+            | LossReason::SafetyModuleSilent
+            | LossReason::ShuttingDown => true,
             // Gravity computed from a lost encoder would be wrong.
-            LossReason::Encoder(_) | LossReason::Motor(..) => false,
+            LossReason::EncoderLost(_) | LossReason::Motor(..) => false,
             // Neither the pose nor its torque can be relied on.
-            LossReason::Overspeed(_) | LossReason::NotStopped(_) | LossReason::HoldDrives(_) => {
-                false
-            }
+            LossReason::Overspeed(_)
+            | LossReason::NotStopped(_)
+            | LossReason::OverspeedInHold(_) => false,
         };
         SafeAction { gravity }
     }
@@ -176,7 +176,7 @@ impl From<GuardReason> for LossReason {
         match reason {
             GuardReason::Overspeed { joint, .. } => LossReason::Overspeed(joint),
             GuardReason::NotStopped { joint, .. } => LossReason::NotStopped(joint),
-            GuardReason::NotInGravityHold => LossReason::Activated,
+            GuardReason::NotInGravityHold => LossReason::ActivatedOutsideGravityHold,
         }
     }
 }

@@ -1,15 +1,15 @@
-//! The cycle: angles in, torques out, once per period.
+//! The plant loop runs one cycle per period: it reads joint angles and sends torques.
 //!
 //! ```text
 //! 0  request -> collect the replies -> publish -> wait for the answer -> safe action -> torques
-//!    -> something less urgent, if it fits -> drain until the next period
+//!    -> auxiliary poll, if it fits -> receive until the next period
 //! ```
 //!
-//! The loop computes no torques, with one exception: it holds and lays down an arm that falls without torque, when
-//! the controller is lost or wants none. A cycle allocates no memory, takes no lock and writes no log.
+//! The loop computes no torques, with one exception: if the controller is lost or requests no torque, the loop holds an
+//! arm that falls without torque and lays it down. A cycle allocates no memory, takes no lock and writes no log.
 
 use crate::budget::Overload;
-use crate::drive::{Drive, Lower, Reserved, Rest, TipForce};
+use crate::drive::{Drive, LoweringMode, ReservedTimes, TipForce, TorqueOffBehaviour};
 use crate::error::LoopError;
 use crate::guard::{Action, GuardInput, SafeActionMachine, Stage, Torque};
 use crate::hold_check::HoldCheck;
@@ -30,18 +30,18 @@ pub struct CycleConfig {
     pub answer_ns: u64,
 }
 
-/// The cycle of a running arm.
+/// The plant loop of an arm after start-up.
 pub struct PlantLoop<const N: usize, D, L> {
     drive: D,
     link: L,
     arm: Arm<N>,
     cycle_config: CycleConfig,
-    reserved: Reserved,
+    reserved: ReservedTimes,
     guard: SafeActionMachine,
     drive_guard: DriveGuard<N>,
-    /// Of an arm that falls without torque.
+    /// Holding and laying down; `None` for an arm whose motors brake without torque.
     stowing: Option<Stowing<N>>,
-    /// Motion of an arm that the loop holds.
+    /// Check of the motion of an arm that the loop holds.
     hold_check: HoldCheck<N>,
     period_s: f64,
     cycle: u64,
@@ -58,8 +58,8 @@ pub struct PlantLoop<const N: usize, D, L> {
 }
 
 impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
-    /// Starts the cycle of drives that have completed start-up; `stow` is how an arm that falls without torque is
-    /// laid down, and is not used for others.
+    /// Creates the plant loop of drives that have completed start-up. `stow` configures how an arm that falls without torque is
+    /// held and laid down; it is ignored for other arms.
     ///
     /// # Errors
     /// [`Overload`] if the period is too short for the drives.
@@ -73,7 +73,7 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         let budget = drive.budget();
         let budget = budget.off_bus_time("the controller's answer", cycle_config.answer_ns);
         budget.check(cycle_config.period_ns)?;
-        let falls = drive.rest() == Rest::Falls;
+        let falls = drive.torque_off_behaviour() == TorqueOffBehaviour::Falls;
         let stowing = stow.filter(|_| falls);
         let guard = match (falls, &stowing) {
             (true, Some(stow)) => SafeActionMachine::falling((stow.hold_s.max(0.0) * 1e9) as u64),
@@ -174,7 +174,7 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
                 let elapsed_s = periods as f64 * self.period_s;
                 self.hold_check.observe(&velocity, elapsed_s);
                 if !matches!(self.guard.stage(), Stage::Damping(..)) {
-                    self.hold_check.is_not_damping();
+                    self.hold_check.reset_runaway();
                 }
             }
             _ => self.hold_check.reset(),
@@ -195,13 +195,16 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
             now_ns,
             answer: command.map(|command| command.wants_torque),
             drive_guard_loss: drive_guard_check.err().map(LossReason::from),
-            hold_loss: self.hold_check.driven().map(LossReason::HoldDrives),
+            hold_loss: self
+                .hold_check
+                .accelerated_joint()
+                .map(LossReason::OverspeedInHold),
             missing,
             unsent: state.unsent,
             bus_off: state.bus_off,
             drives: state.drives,
             drive_loss: state.loss,
-            leaving: self.shutting_down,
+            shutting_down: self.shutting_down,
         };
         let lies = self.has_stowed(now_ns);
         let action = self.guard.cycle(&input, lies);
@@ -212,7 +215,7 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         Ok(action)
     }
 
-    /// Copies the counts of the drives.
+    /// Copies the counters of the drives.
     fn copy_counts(&mut self) {
         let counters = self.drive.counters();
         self.counters.tx_lost = counters.tx_lost;
@@ -220,8 +223,8 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         self.counters.overruns = counters.overruns;
     }
 
-    /// Starts the next period; returns its start \[ns\]. Skips periods that are over, and one whose remaining time is
-    /// too short for replies, answer and torques; the replies of a skipped period do not count as missing.
+    /// Starts the next period; returns its start \[ns\]. Skips periods that are over, and a period whose remaining time is too
+    /// short for replies, answer and torques. Replies of a skipped period do not count as missing.
     fn start_period(&mut self) -> Result<u64, LoopError> {
         let now_ns = self.drive.now_ns();
         let period_ns = self.cycle_config.period_ns;
@@ -271,14 +274,14 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
             stamp_ns: self.drive.monotonic_ns(start_ns),
             position_rad,
             tip_force_n,
-            drives: self.drives_of_controller(),
+            drives: self.drives_for_controller(),
             counters: self.counters,
         }
     }
 
-    /// State of the drives for the controller. An arm that this loop holds or lays down itself does not follow the
-    /// controller's torques, whatever it requests: its drives are not active to it.
-    fn drives_of_controller(&self) -> Drives {
+    /// Returns the state of the drives that is reported to the controller: while this loop holds the arm or lays it down, the
+    /// drives do not apply the controller's torques and are reported as held.
+    fn drives_for_controller(&self) -> Drives {
         match self.drives() {
             Drives::Active if self.guard.holds() => Drives::Held,
             drives => drives,
@@ -295,7 +298,7 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         let answer = self.link.answer(self.cycle, wait_ns)?;
         self.cycle += 1;
         self.counters.late_answers += answer.late;
-        // A command that is not finite counts as missing: the last fallback torque is applied.
+        // A command that is not finite counts as a missing answer: the last fallback torque is applied.
         let command = answer.command.filter(Command::is_finite);
         self.counters.unusable += u64::from(answer.command.is_some() && command.is_none());
         match &command {
@@ -315,14 +318,16 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         Ok(command)
     }
 
-    /// Whether an arm that is being laid down has arrived, or one that is damped is at rest or is not slowed.
+    /// Whether an arm that is being laid down has arrived, or an arm that is damped stands still or is not slowed.
     fn has_stowed(&self, now_ns: u64) -> bool {
         match (self.guard.stage(), &self.stowing) {
             (Stage::Stowing(_, since_ns), Some(stowing)) => {
                 stowing.has_ended((now_ns - since_ns) as f64 * 1e-9)
             }
             (Stage::Stowing(..), None) => true,
-            (Stage::Damping(..), _) => self.hold_check.rests() || self.hold_check.runs_away(),
+            (Stage::Damping(..), _) => {
+                self.hold_check.stands_still() || self.hold_check.runs_away()
+            }
             _ => false,
         }
     }
@@ -350,7 +355,7 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
                             stowing.hold_nm()
                         }
                     };
-                    // What the controller last sent ends as fast as with a fallback torque.
+                    // At the start of holding, the torque may leave the controller's last torque as fast as a fallback torque may.
                     (torque_nm, action.torque == Torque::Hold)
                 }
                 None => (self.fallback_nm, true),
@@ -366,8 +371,8 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         let torque_nm = if self.drives() == Drives::Active && action.torque != Torque::None {
             self.drive_guard.limited_nm(&wanted_nm, stopping)
         } else {
-            // The motors become active some cycles before this program learns of it. Until then it sends gravity
-            // compensation only, within the limits, and zero in all other modes.
+            // The motors become active some cycles before this program receives their state. Until then it sends the torque of
+            // gravity hold, within the limits, and zero in all other modes.
             let in_gravity_hold =
                 command.is_some_and(|command| command.mode == Some(Mode::GravityHold));
             let activation_nm = if in_gravity_hold {
@@ -380,9 +385,9 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         self.drive.send_torques(&torque_nm, &damping_nm_s_per_rad)?;
         if let (true, Stage::Lowering(reason, _)) = (action.lower, self.guard.stage()) {
             let how = if action.idle_motors {
-                Lower::Forced
+                LoweringMode::Forced
             } else {
-                Lower::Regular
+                LoweringMode::Regular
             };
             self.drive.lower(how, reason)?;
         }

@@ -1,4 +1,4 @@
-//! A bus with the bookkeeping of a cycle: frames not yet confirmed, the time that the bus was busy, its faults.
+//! A bus that also tracks unconfirmed frames, the time for which the bus was busy, and bus faults.
 
 use crate::drive::DriveCounters;
 use crate::error::LoopError;
@@ -6,7 +6,7 @@ use crate::unconfirmed::UnconfirmedFrames;
 use supple_bus::{Bus, BusError, BusFault, Event};
 use supple_can_frame::{BitRates, CanFrame};
 
-/// A bus as a drive uses it in the cycle.
+/// Access of a drive to its bus in the cycle.
 #[derive(Debug)]
 pub struct BusPort<B> {
     bus: B,
@@ -18,7 +18,7 @@ pub struct BusPort<B> {
 }
 
 impl<B: Bus> BusPort<B> {
-    /// A port of a bus with these bit rates.
+    /// Creates the port of a bus with these bit rates.
     pub fn new(bus: B, rates: BitRates) -> BusPort<B> {
         BusPort {
             bus,
@@ -40,7 +40,7 @@ impl<B: Bus> BusPort<B> {
         &mut self.bus
     }
 
-    /// Gives the bus back.
+    /// Returns the bus.
     pub fn into_bus(self) -> B {
         self.bus
     }
@@ -67,8 +67,8 @@ impl<B: Bus> BusPort<B> {
         self.unconfirmed.contains(frame)
     }
 
-    /// The next frame of another node, or `None` at `until_ns`; with the promise to send nothing until `frames` more
-    /// have arrived. Other events are handled here.
+    /// Waits for the next event until `until_ns`; the caller promises to send nothing until `frames` more frames of other
+    /// nodes have arrived. Handles all events except frames of other nodes.
     ///
     /// # Errors
     /// If the bus itself fails.
@@ -105,29 +105,29 @@ impl<B: Bus> BusPort<B> {
         self.counters.replies_lost += replies;
     }
 
-    /// Frames of the previous cycle were not sent.
+    /// Whether frames of the previous cycle were not sent.
     pub fn frames_lost(&self) -> bool {
         self.frames_lost
     }
 
-    /// The interface is bus-off.
+    /// Whether the CAN interface is bus-off.
     pub fn bus_off(&self) -> bool {
         self.bus_off
     }
 
-    /// Counts since the start.
+    /// Returns the counters since the start.
     pub fn counters(&self) -> DriveCounters {
         self.counters
     }
 }
 
-/// Result of waiting at a [`BusPort`].
+/// Result of [`BusPort::receive`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Received {
     /// A frame of another node.
     Frame(CanFrame),
     /// An event that the port has handled.
     Other,
-    /// The time is reached.
+    /// No event arrived until the time.
     Nothing,
 }

@@ -7,18 +7,18 @@ use supple_ipc::message::{self, ArmState, PlantReport, TorqueCommand};
 use supple_ipc::{IpcError, PlantLink};
 use supple_realtime::{Stop, pause};
 
-/// Poll interval in virtual time for an answer, and for a shutdown.
+/// Interval in virtual time at which the link checks for an answer and for a shutdown request.
 const ANSWER_POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Poll interval for a controller to join, and time for an answer once the controller is lost.
 const JOIN_POLL_INTERVAL: Duration = Duration::from_millis(1);
-/// Polls without an answer after which the controller counts as lost in virtual time (2 s).
+/// Number of polls without an answer after which the controller counts as lost in virtual time (2 s).
 const MAX_UNANSWERED_POLLS: u32 = 40;
 
-/// The plant's end of shared memory.
+/// The plant's link to the controller through shared memory.
 pub struct SharedMemoryLink {
     link: PlantLink,
     virtual_time: bool,
-    /// The last cycle in virtual time was not answered, so the next ones wait for a poll interval only.
+    /// Whether the last cycle in virtual time was not answered; the following cycles then wait for one poll interval only.
     lost: bool,
     /// Number of commands for another arm.
     wrong_arm: u64,
@@ -26,8 +26,8 @@ pub struct SharedMemoryLink {
 }
 
 impl SharedMemoryLink {
-    /// In real time an answer is awaited for as long as the cycle allows; in virtual time, which does not advance meanwhile, until it
-    /// arrives or the controller counts as lost after 2 s.
+    /// Creates the link. In real time it waits for an answer as long as the cycle allows. In virtual time, which does not
+    /// advance during the wait, it waits until the answer arrives or the controller counts as lost after 2 s.
     pub fn new(link: PlantLink, virtual_time: bool, stop: Stop) -> SharedMemoryLink {
         SharedMemoryLink {
             link,
@@ -38,7 +38,7 @@ impl SharedMemoryLink {
         }
     }
 
-    /// Decodes a command; one for another arm is counted and discarded.
+    /// Decodes a command; counts and discards a command for an arm with another number of joints.
     fn read<const N: usize>(&mut self, command: &TorqueCommand) -> Option<Command<N>> {
         let torques = (command.torque::<N>(), command.fallback_torque::<N>());
         let (Ok(torque_nm), Ok(fallback_torque_nm)) = torques else {

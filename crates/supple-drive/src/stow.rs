@@ -1,37 +1,36 @@
-//! Holding an arm that falls without torque, and laying it down.
+//! Torques that hold an arm that falls without torque, and lay it down.
 //!
-//! While the arm is held, its torque is gravity compensation at the measured pose, and the motors damp. While it is
-//! laid down, a reference moves from the pose at which that began to the rest pose, at a low joint speed, and a weak
-//! spring of each joint pulls towards it: `tau = g(q) + k (q_ref - q)`. A joint without an angle keeps its last one
-//! for gravity and has no spring. When the reference has arrived, the torque fades to zero while the motors still damp:
-//! the arm settles on its support, and disabling the motors takes no torque away. Where that torque drives the arm, the
-//! safe action ends it (`guard.rs`). Source: own derivation; the reference is the quintic `10 s^3 - 15 s^4 + 6 s^5`.
+//! While the arm is held, the torque is gravity compensation at the measured pose, and the motors damp. While the arm is
+//! laid down, a reference moves from the pose at that time to the rest pose at a low joint speed, and a weak spring pulls
+//! each joint towards it: `tau = g(q) + k (q_ref - q)`. For a joint whose angle is missing, gravity is computed from its
+//! last angle, and the spring is off. When the reference has arrived, the torque fades to zero while the motors still damp:
+//! the arm settles on its support, and disabling the motors does not change the torque. If this torque accelerates the
+//! arm, the safe action ends it (`guard.rs`). Source: own derivation; the reference is the quintic `10 s^3 - 15 s^4 + 6 s^5`.
 
 use supple_core::dynamics::gravity;
 use supple_core::{Arm, Vector};
 
-/// How an arm is held and laid down.
+/// Configuration of holding an arm and laying it down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StowConfig<const N: usize> {
-    /// Rest pose \[rad\]; `None` if there is none: the arm is held, and disabled where it is.
+    /// Rest pose \[rad\]; if `None`, the arm is held and then disabled in its pose.
     pub stow_rad: Option<Vector<N>>,
     /// Damping that the motors add while they hold and lay down \[N m s/rad\].
     pub damping_nm_s_per_rad: Vector<N>,
     /// Stiffness towards the reference \[N m/rad\].
     pub stiffness_nm_per_rad: Vector<N>,
-    /// Largest joint speed of the reference \[rad/s\].
+    /// Maximum joint speed of the reference \[rad/s\].
     pub speed_rad_per_s: f64,
     /// Time for which the arm is held before it is laid down \[s\].
     pub hold_s: f64,
 }
 
-/// Time in which the torque fades after the reference has arrived, and time without torque until the motors are
-/// disabled \[s\].
+/// Time in which the torque fades after the reference has arrived \[s\].
 const FADE_S: f64 = 1.0;
 const SETTLE_S: f64 = 0.5;
-/// Largest error that the spring sees \[rad\]: a blocked arm is not pushed harder and harder.
+/// Maximum position error of the spring \[rad\], which limits its torque on a blocked arm.
 const MAX_ERROR_RAD: f64 = 0.2;
-/// Peak of the speed of the quintic, times duration over distance.
+/// Peak speed of the quintic, as a multiple of distance over duration.
 const QUINTIC_PEAK: f64 = 1.875;
 
 /// Progress of holding and laying down.
@@ -42,12 +41,12 @@ pub struct Stowing<const N: usize> {
     /// Last known angles \[rad\].
     pose_rad: Vector<N>,
     present: [bool; N],
-    /// Pose in which laying down began \[rad\], and its duration \[s\].
+    /// Pose at the start of laying down \[rad\], and duration of the reference \[s\].
     begin: Option<(Vector<N>, f64)>,
 }
 
 impl<const N: usize> Stowing<N> {
-    /// An arm that is not being laid down.
+    /// Creates the state of an arm that is not being laid down.
     pub fn new(arm: Arm<N>, config: StowConfig<N>) -> Stowing<N> {
         Stowing {
             arm,
@@ -63,7 +62,7 @@ impl<const N: usize> Stowing<N> {
         &self.config
     }
 
-    /// Takes the angles of a cycle \[rad\].
+    /// Processes the angles of a cycle \[rad\].
     pub fn observe(&mut self, position_rad: &[Option<f64>; N]) {
         for (joint, angle) in position_rad.iter().enumerate() {
             self.present[joint] = angle.is_some_and(f64::is_finite);
@@ -73,17 +72,17 @@ impl<const N: usize> Stowing<N> {
         }
     }
 
-    /// Ends laying down; the next call of [`Stowing::stow_nm`] begins anew.
+    /// Ends laying down; the next call of [`Stowing::stow_nm`] starts it from the current pose.
     pub fn reset(&mut self) {
         self.begin = None;
     }
 
-    /// Torque that holds the arm \[N m\].
+    /// Computes the torque that holds the arm \[N m\].
     pub fn hold_nm(&self) -> Vector<N> {
         gravity(&self.arm, &self.pose_rad)
     }
 
-    /// Torque that lays the arm down, `elapsed_s` after that began \[N m\].
+    /// Computes the torque that lays the arm down, `elapsed_s` after the start of laying down \[N m\].
     pub fn stow_nm(&mut self, elapsed_s: f64) -> Vector<N> {
         let hold_nm = self.hold_nm();
         let Some(stow_rad) = self.config.stow_rad else {
@@ -110,7 +109,7 @@ impl<const N: usize> Stowing<N> {
         torque_nm * (1.0 - (elapsed_s - duration_s) / FADE_S).clamp(0.0, 1.0)
     }
 
-    /// Whether the arm lies, `elapsed_s` after laying down began.
+    /// Whether laying down has ended, `elapsed_s` after its start.
     pub fn has_ended(&self, elapsed_s: f64) -> bool {
         match (self.config.stow_rad, self.begin) {
             (None, _) => true,

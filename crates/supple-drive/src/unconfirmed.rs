@@ -1,8 +1,8 @@
-//! Frames sent in a cycle and not yet confirmed by the interface.
+//! Frames that were sent in a cycle and that the CAN interface has not confirmed.
 
 use supple_can_frame::CanFrame;
 
-/// Maximum number of frames in a cycle: a torque and a setting for each of seven motors, rounded up.
+/// Maximum number of frames in a cycle: a torque and a property for each of seven motors, rounded up.
 const CAPACITY: usize = 16;
 
 /// Unconfirmed frames of one cycle.

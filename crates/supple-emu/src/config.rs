@@ -13,7 +13,7 @@ pub struct PuckConfig {
     pub version: i32,
     /// Role; a WAM motor with a magnetic encoder by default.
     pub role: Role,
-    /// Units of torque per N m at the motor.
+    /// Puck torque units per N m at the motor.
     pub units_per_nm: i32,
     /// Maximum torque that the puck applies \[puck units\].
     pub max_torque: i32,
@@ -27,13 +27,13 @@ pub struct PuckConfig {
     pub slot: i32,
     /// Temperature \[degrees Celsius\]; 30 by default.
     pub temperature: i32,
-    /// Whether the node answers at all; true by default.
+    /// Whether the node is on the bus; true by default.
     pub present: bool,
 }
 
 impl PuckConfig {
-    /// Puck of joint `number`, 1 to 7, of a WAM. Units, limits and poles are Barrett's defaults (btutil,
-    /// btdiag).
+    /// Returns the configuration of the puck of joint `number`, 1 to 7, of a WAM. Units, limits and poles are Barrett's defaults
+    /// (btutil, btdiag).
     pub fn wam(number: usize) -> PuckConfig {
         let (units_per_nm, poles) = match number {
             1..=4 => (2700, 12),
@@ -66,15 +66,15 @@ impl PuckConfig {
 pub struct SafetyConfig {
     /// Firmware version; 175 by default.
     pub version: i32,
-    /// If an arm puck sends no position for this long, the safety module makes all motors idle \[ns\]; 100 ms by default, the longest
-    /// receive timeout of OWD (OpenWAM's driver). The real value is not published.
+    /// Time without a position of an arm puck after which the safety module sets all motors to idle \[ns\]; 100 ms by default,
+    /// the longest receive timeout of OWD (OpenWAM's driver). The real value is not published.
     pub heartbeat_ns: u64,
     /// Time within which the arm must slow down after a velocity fault to avoid an emergency stop \[ns\]; 0.5 s
     /// as documented.
     pub slow_down_ns: u64,
     /// Bus voltage \[V\]; 48 by default.
     pub voltage: i32,
-    /// Whether the node answers at all; true by default.
+    /// Whether the node is on the bus; true by default.
     pub present: bool,
 }
 
@@ -87,10 +87,11 @@ pub struct EmulatorConfig {
     pub safety: SafetyConfig,
     /// Whether a force/torque sensor is mounted; true by default.
     pub force_sensor: bool,
-    /// Whether the positions are already known, as after a run of another program: the counts match the joint
-    /// angles and ZERO is 1. False by default: the counts start at 0 in any pose.
+    /// Whether the arm has its position reference, as after a run of another program: the counts match the joint angles and ZERO
+    /// is 1. False by default: the counts start at 0 in any pose.
     pub zeroed: bool,
-    /// Whether a cradle holds the arm in its start pose until any motor enters torque mode; true by default. Otherwise the arm descends against the braking motors from the start.
+    /// Whether a cradle holds the arm in its start pose until any motor enters torque mode; true by default. Without a
+    /// cradle the arm sinks against the braking motors from the start.
     pub cradle: bool,
     /// Time between a frame's end and a node's answer to it \[ns\]; 10 us by default, an assumption.
     pub latency_ns: u64,
@@ -99,8 +100,8 @@ pub struct EmulatorConfig {
     /// Time from "set STAT" until a puck is ready \[ns\]; 0.8 s by default, within the 1 s that libbarrett
     /// waits.
     pub wake_ns: u64,
-    /// From this time after "set STAT" until the puck is ready, its transceiver switches off and on, and every frame of the host in
-    /// this interval makes the host's controller go bus-off \[ns\]; 0.2 s by default, an assumption.
+    /// Time after "set STAT" at which the puck's transceiver begins to reset \[ns\]; 0.2 s by default, an assumption. From then
+    /// until the puck is ready, every frame of the host makes the host's CAN controller go bus-off.
     pub transceiver_reset_ns: u64,
     /// Time of the bus-off recovery, the interface's `restart-ms` \[ns\]; 100 ms by default.
     pub restart_ns: u64,
@@ -111,7 +112,7 @@ pub struct EmulatorConfig {
 }
 
 impl EmulatorConfig {
-    /// Configuration of a WAM with `joints` joints.
+    /// Returns the configuration of a WAM with `joints` joints.
     pub fn wam(joints: usize) -> EmulatorConfig {
         EmulatorConfig {
             pucks: (1..=joints).map(PuckConfig::wam).collect(),

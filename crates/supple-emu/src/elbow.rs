@@ -1,7 +1,7 @@
 //! Points of the arm that the safety module monitors: the elbow and a point of the forearm.
 //!
-//! The module uses the WAM's kinematics without any tool: the elbow 550 mm from the shoulder and 45 mm to the
-//! side, and the point 350 mm beyond it. With `q1` to `q4` the joints:
+//! The module uses the WAM's kinematics without a tool: the elbow is 550 mm from the shoulder and 45 mm to the side, the
+//! other point 350 mm beyond the elbow. With the joint angles `q1` to `q4`:
 //!
 //! ```text
 //! elbow   = Rz(q1) Ry(q2) Rz(q3) (0.045, 0, 0.55)
@@ -16,7 +16,7 @@ use supple_core::nalgebra::Vector3;
 const SHOULDER_TO_ELBOW_M: Vector3<f64> = Vector3::new(0.045, 0.0, 0.55);
 const ELBOW_TO_FOREARM_M: Vector3<f64> = Vector3::new(-0.045, 0.0, 0.35);
 
-/// Both points at the first four joint angles \[rad\], from the shoulder \[m\].
+/// Returns both points relative to the shoulder \[m\] at the first four joint angles \[rad\].
 pub fn monitored_points_m(q: &[f64; 4]) -> [Vector3<f64>; 2] {
     let rotation = |roll: [f64; 3]| Pose::from_xyz_rpy([0.0; 3], roll).rotation;
     let upper = rotation([0.0, q[1], q[0]]) * rotation([0.0, 0.0, q[2]]);
@@ -31,7 +31,7 @@ mod tests {
     use supple_core::dynamics::joint_poses;
     use supple_model::Description;
 
-    /// The description models the same arm with another frame convention.
+    /// Compares with the arm's description, which uses another frame convention.
     #[test]
     fn the_elbow_matches_the_described_arm() {
         let config = Description::asset("wam4").unwrap().config::<4>().unwrap();

@@ -1,4 +1,4 @@
-//! The complete arm on its bus: an event-driven simulation in virtual time.
+//! The complete emulated WAM on its bus: an event-driven simulation in virtual time.
 
 use crate::config::EmulatorConfig;
 use crate::error::EmulatorError;
@@ -50,29 +50,29 @@ pub struct Emulator<const N: usize> {
     sensor: Option<ForceSensor>,
     /// Time until which the host's CAN controller is bus-off \[ns\].
     host_bus_off_until_ns: Option<u64>,
-    /// Fault that the host has yet to receive.
+    /// Fault that the host has not received yet.
     pending_fault: Option<BusFault>,
     random: Random,
     arm_events: Vec<(u64, ArmEvent)>,
-    /// CLOCK_MONOTONIC less the arm's time at present \[ns\].
+    /// Current difference between CLOCK_MONOTONIC and the arm's time \[ns\].
     offset_ns: u64,
-    /// That offset at each event \[ns\].
+    /// `offset_ns` at each event.
     event_offsets_ns: Vec<u64>,
     /// Scheduled button presses in order of time.
     presses: VecDeque<(u64, ButtonPress)>,
     /// Button presses scheduled relative to the host's first torque, with their delay after it \[ns\].
     after_first_torque: Vec<(u64, ButtonPress)>,
     powered: bool,
-    /// A cradle holds the arm in its start pose: until the motors next enter torque mode.
+    /// Whether a cradle holds the arm in its start pose, until the motors enter torque mode.
     in_cradle: bool,
     start_rad: Vector<N>,
 }
 
 impl<const N: usize> Emulator<N> {
-    /// An arm at rest at `start_rad`, at time `start_ns`: in the emergency stop, with pucks without power, or if `config.zeroed` in
-    /// idle, with pucks that are awake and have the home pose. Transmission, amplifiers,
-    /// braking and delays beyond the first cycle come from the plant's actuator model; counts and torque units from the
-    /// pucks. The arm starts at `start_rad` less the bias of the encoders.
+    /// Creates an arm at standstill at `start_rad`, at time `start_ns`. It is in emergency stop with unpowered pucks; with
+    /// `config.zeroed` it is in idle with pucks that are awake and have their position reference. The plant's actuator model
+    /// provides transmission, amplifiers, braking and delays beyond the first cycle; the pucks provide counts and torque units.
+    /// The bias of the encoders is subtracted from `start_rad`.
     ///
     /// # Errors
     /// If the arm does not have 4 or 7 joints or a puck for each, its transmission is singular, no property ids are known for a
@@ -97,7 +97,7 @@ impl<const N: usize> Emulator<N> {
             .try_inverse()
             .ok_or(EmulatorError::Transmission)?;
         let step_s = config.step_ns as f64 * 1e-9;
-        // The emulated bus delays torques by one cycle already.
+        // The emulated bus already delays torques by one cycle.
         let extra_delay_s =
             plant.actuators.torque_delay_cycles.saturating_sub(1) as f64 * plant.cycle_s;
         plant.actuators = ActuatorModel {
@@ -108,9 +108,9 @@ impl<const N: usize> Emulator<N> {
         };
         plant.step_s = step_s;
         plant.cycle_s = plant.step_s;
-        // The bus has a jitter of its own.
+        // The bus has its own jitter.
         plant.cycle_jitter = 0.0;
-        // The host zeroes the encoders as if the arm were in its home pose: the angles read are off by the bias.
+        // The host sets the positions as if the arm were exactly in its home pose: the measured angles have the bias as error.
         let start_rad = start_rad - plant.actuators.encoder_bias_rad;
         let mut pucks = Vec::with_capacity(N);
         for (index, puck) in config.pucks.iter().enumerate() {
@@ -200,17 +200,18 @@ impl<const N: usize> Emulator<N> {
     /// Puts the arm back into the cradle in its start pose, as a person does.
     ///
     /// # Errors
-    /// The reason in words, and nothing moves: a motor follows torque commands, or faults of the plant are injected.
+    /// The reason as text; the arm then does not move. Reasons: a motor follows torque commands, faults of the plant are injected,
+    /// or an object blocks the cradle.
     pub fn put_into_cradle(&mut self) -> Result<(), &'static str> {
         if self
             .pucks
             .iter()
             .any(|puck| puck.mode() == MotorMode::Torque)
         {
-            return Err("the motors hold the arm: press idle first");
+            return Err("the motors apply torque: press idle first");
         }
         if !self.injector.is_empty() {
-            return Err("faults are injected, which count from the pose at the start: start again");
+            return Err("injected faults refer to the start pose: restart the emulator instead");
         }
         if self
             .plant
@@ -249,7 +250,7 @@ impl<const N: usize> Emulator<N> {
         &self.safety
     }
 
-    /// The safety module, to set the bus voltage.
+    /// The safety module, for example to set the bus voltage.
     pub fn safety_mut(&mut self) -> &mut SafetyModule {
         &mut self.safety
     }
@@ -274,7 +275,7 @@ impl<const N: usize> Emulator<N> {
         &mut self.plant
     }
 
-    /// Torque of each motor, braking included \[N m\].
+    /// Torque of each motor, including braking \[N m\].
     pub fn motor_torque_nm(&self) -> Vector<N> {
         let speed = self.motor_from_joint * self.plant.truth().motor_velocity_rad_per_s;
         let braking = &self.plant.config().actuators.braking_nm_s_per_rad;
@@ -328,8 +329,8 @@ impl<const N: usize> Emulator<N> {
         wire.min(self.next_tick_ns)
     }
 
-    /// Skips `gap_ns`: advances the clock and the time of the next physics step by that much, without motion, and discards all frames
-    /// that wait for the bus. Timeouts go on meanwhile: those of the safety module, of a wake-up and of the host's bus-off.
+    /// Advances the clock and the time of the next physics step by `gap_ns` without motion, and discards all frames that wait for
+    /// the bus. The timeouts of the safety module, of a wake-up and of the host's bus-off continue.
     pub fn shift_clock(&mut self, gap_ns: u64) {
         let now = self.now_ns + gap_ns;
         self.wire.pause(gap_ns);
@@ -354,7 +355,7 @@ impl<const N: usize> Emulator<N> {
         }
     }
 
-    /// One physics step, and the time-driven behaviour of the nodes.
+    /// Runs one physics step and the time-driven behaviour of the nodes.
     fn tick(&mut self) {
         if !self.in_cradle {
             let motor_torque_nm = self.commanded_nm();
@@ -397,8 +398,8 @@ impl<const N: usize> Emulator<N> {
         self.next_tick_ns += self.config.step_ns;
     }
 
-    /// After a change of the safety module's mode, sends its frame to the motors and switches the pucks' power; without
-    /// a frame, nothing has changed.
+    /// Applies a change of the safety module's mode: sends its frame to the motors and switches the pucks' power. Without a frame,
+    /// the mode has not changed.
     fn apply_safety_mode(&mut self, frame: Option<CanFrame>) {
         let Some(frame) = frame else {
             return;
@@ -433,7 +434,7 @@ impl<const N: usize> Emulator<N> {
         }
     }
 
-    /// Whether the transceiver of a waking puck resets, so that the host must not send.
+    /// Whether the transceiver of a waking puck is resetting, so that the host must not send.
     fn any_transceiver_resetting(&self) -> bool {
         self.pucks.iter().any(|puck| match puck.power() {
             Power::Waking(since_ns) => self.now_ns >= since_ns + self.config.transceiver_reset_ns,
@@ -441,13 +442,13 @@ impl<const N: usize> Emulator<N> {
         })
     }
 
-    /// A frame transmission is complete: delivers it to all other nodes. Returns the event for the host.
+    /// Delivers a completely transmitted frame to all other nodes; returns the event for the host.
     fn deliver(&mut self, frame: CanFrame) -> Option<Event> {
         let from_host = is_from_host(&frame);
         if from_host && self.any_transceiver_resetting() {
             self.record(ArmEvent::HostSentDuringWakeUp);
             self.host_bus_off_until_ns = Some(self.now_ns + self.config.restart_ns);
-            // A controller that is bus-off sends none of the frames in its queue.
+            // A CAN controller that is bus-off sends no frame of its queue.
             self.wire.discard(is_from_host);
             return Some(Event::Fault(BusFault::BusOff));
         }
@@ -528,7 +529,7 @@ fn commands_torque(frame: &CanFrame) -> bool {
     to_motors && torques.is_ok_and(|torques| torques.slots.iter().any(|t| t.units() != 0))
 }
 
-/// Whether the host sent the frame: no node of the arm has other ids than those of its protocol.
+/// Whether the host sent the frame. Frames that are not of the protocol are from the host, because no node sends them.
 fn is_from_host(frame: &CanFrame) -> bool {
     MessageId::of(frame).is_none_or(|id| id.from() == NodeId::HOST)
 }
@@ -553,7 +554,7 @@ impl<const N: usize> EmulatedNodes for Emulator<N> {
             let end_ns = self.wire.next_end_ns().unwrap_or(u64::MAX);
             let next_ns = end_ns.min(self.next_tick_ns);
             if next_ns > until_ns {
-                // A frame that is ready by now starts before the host sends its next one.
+                // A frame that is ready by now starts before the next frame of the host.
                 self.wire.advance(until_ns);
                 self.now_ns = until_ns;
                 return None;

@@ -1,7 +1,7 @@
 //! The pendant's socket: accepts button presses and reports the state of the arm.
 //!
 //! A thread accepts connections and forwards each line to the loop that owns the arm; the answer is one line of
-//! JSON. Idle clients and clients that do not read block nobody (`pendant_clients.rs`). The socket is separate
+//! JSON. Idle clients and clients that do not read do not block other clients (`pendant_clients.rs`). The socket is separate
 //! from the bus.
 
 use crate::emulator::{ArmEvent, Emulator};
@@ -51,7 +51,7 @@ struct ErrorReply {
 }
 
 impl PendantSocket {
-    /// Listens in the folder, accessible only to the owner. Replaces the socket of a process that has ended.
+    /// Creates the socket in the folder, accessible only to the owner. Replaces the socket of a process that has ended.
     ///
     /// # Errors
     /// If the socket cannot be created.
@@ -164,6 +164,6 @@ fn status<const N: usize>(emulator: &Emulator<N>) -> Status {
 }
 
 fn json(value: &impl Serialize) -> String {
-    // Plain data can always be serialised; an error would show as an empty line.
+    // Plain data can always be serialised; an error would result in an empty line.
     serde_json::to_string(value).unwrap_or_default()
 }

@@ -1,7 +1,7 @@
-//! Client connections of the pendant socket: reads a line from each client without blocking on any, and answers it.
+//! Client connections of the pendant socket: reads a line from each client without blocking, and answers it.
 //!
-//! A client that sends nothing stays connected until its slot is needed; every other one is disconnected after its answer, or
-//! after a timeout if it does not read it. The numbers of clients of either kind are bounded.
+//! A client that sends nothing stays connected until its slot is needed. Every other client is disconnected after its answer,
+//! or after a timeout if it does not read the answer. The numbers of clients of both kinds are bounded.
 
 use core::time::Duration;
 use rustix::event::{PollFd, PollFlags, poll};
@@ -11,9 +11,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Sender, SyncSender, sync_channel};
 
-/// Maximum number of clients that have not sent their line yet; beyond it the oldest is disconnected.
+/// Maximum number of clients that have not sent their line yet; a further client replaces the oldest one.
 const MAX_CLIENTS_WITHOUT_REQUEST: usize = 16;
-/// Maximum number of clients with a pending answer; beyond it commands are carried out without an answer.
+/// Maximum number of clients with a pending answer; further commands are executed without an answer.
 const MAX_CLIENTS_AWAITING_ANSWER: usize = 32;
 /// Maximum length of a line \[bytes\].
 const LINE_BYTES: usize = 256;
@@ -37,17 +37,17 @@ struct Client {
 
 /// Result of reading from a client.
 enum ReadResult {
-    /// No complete line yet.
+    /// The client has not sent a complete line yet.
     Incomplete,
-    /// A line, or what a client sent before it ended its side.
+    /// A line, or the data that a client sent before it closed its sending side.
     Line(String),
-    /// More bytes than a line may have.
+    /// The line exceeds the maximum length.
     TooLong,
     /// The client has disconnected.
     Disconnected,
 }
 
-/// Accepts connections and forwards one line of each until the receiver is gone.
+/// Accepts connections and forwards one line of each client, until the receiver is dropped.
 pub(crate) fn serve(listener: &UnixListener, requests: &Sender<PendantRequest>) {
     let awaiting_answer = Arc::new(AtomicUsize::new(0));
     let mut without_request: Vec<Client> = Vec::with_capacity(MAX_CLIENTS_WITHOUT_REQUEST);
@@ -64,7 +64,7 @@ pub(crate) fn serve(listener: &UnixListener, requests: &Sender<PendantRequest>) 
                 });
             }
             Err(error) if error.kind() != ErrorKind::WouldBlock => {
-                // Most often no file descriptor is left: close the oldest client.
+                // The usual cause is that no file descriptor is left: the oldest client is disconnected.
                 if !without_request.is_empty() {
                     without_request.remove(0);
                 }
@@ -134,7 +134,7 @@ impl Client {
     }
 }
 
-/// Forwards a line and starts a thread that writes the answer; false if the receiver is gone.
+/// Forwards a line and starts a thread that writes the answer; returns false if the receiver is dropped.
 fn dispatch(
     stream: UnixStream,
     line: String,

@@ -1,13 +1,13 @@
-//! A motor puck: states, properties and motor.
+//! Emulated motor puck: power states, properties and motor.
 //!
 //! ```text
 //! no power -> monitor (STAT 0) -> waking -> ready (STAT 2), MODE idle <-> torque
-//!        emergency stop: no power, counts forgotten
+//!        emergency stop: no power, counts lost
 //! ```
 //!
-//! In the monitor the puck answers only the properties of the monitor's list. Once ready, it uses the ids of its
-//! firmware. Other properties, such as the gains of the puck's own position loops, have no effect: their values
-//! are stored and returned. Source: libbarrett, btclient, the user's manual.
+//! In the monitor, the puck answers only requests for the monitor's properties. Once ready, it uses the property ids of its
+//! firmware. Properties that the emulation does not model, such as the gains of the puck's position loops, have no effect:
+//! their values are stored and returned. Source: libbarrett, btclient, the user's manual.
 
 use crate::config::PuckConfig;
 use crate::store::{PropertyStore, property_of};
@@ -25,7 +25,7 @@ pub enum Power {
     Off,
     /// The monitor runs.
     Monitor,
-    /// Waking up since this time \[ns\]; neither receives nor answers.
+    /// The puck has been waking up since this time \[ns\]; it neither receives nor answers.
     Waking(u64),
     /// The firmware runs.
     Ready,
@@ -49,8 +49,7 @@ pub struct Puck {
 }
 
 impl Puck {
-    /// Puck of joint `number`, from 1, in its monitor. `None` if the property ids of its firmware are not
-    /// known.
+    /// Creates the puck of joint `number`, from 1, in its monitor; `None` if the property ids of its firmware are not known.
     pub fn new(number: usize, config: PuckConfig) -> Option<Puck> {
         let node = NodeId::new(number as u8).ok()?;
         let table = PropertyTable::of_firmware(PuckKind::Motor, config.version).ok()?;
@@ -110,7 +109,7 @@ impl Puck {
         self.mode
     }
 
-    /// Motor torque without braking \[N m\]; zero unless it is in torque mode.
+    /// Motor torque without braking \[N m\]; zero unless the puck is in torque mode.
     pub fn torque_nm(&self) -> f64 {
         match (self.power, self.mode) {
             (Power::Ready, MotorMode::Torque) => {
@@ -131,7 +130,7 @@ impl Puck {
         self.encoder = (revolutions * f64::from(self.config.counts_per_revolution)).round() as i64;
     }
 
-    /// Reported position: the counter has 22 bits.
+    /// Reported position, a counter of 22 bits.
     pub fn counts(&self) -> i32 {
         ((self.encoder + self.offset) as i32) << 10 >> 10
     }
@@ -286,7 +285,7 @@ impl Puck {
                 let limit = self.store.get(Property::MT).unwrap_or(0).max(0);
                 self.torque = value.clamp(-limit, limit);
             }
-            // Factory settings, which a maintenance tool must unlock first.
+            // Factory settings have no effect: a maintenance tool must unlock them first.
             Some(Property::VERS | Property::ROLE | Property::SN | Property::ID) | None => {}
             Some(property) => self.store.set(property, value),
         }

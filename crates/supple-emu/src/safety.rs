@@ -1,15 +1,15 @@
-//! The safety module and its pendant.
+//! Emulated safety module with its pendant.
 //!
 //! ```text
 //! e-stop --Shift-Idle--> idle --Shift-Activate--> active
 //!        <-- button -----      <-- fault, host --
 //! ```
 //!
-//! It receives torque commands and position replies. In active, a torque or a speed above its fault limit, a bus
-//! voltage outside its limits, or missing positions switch it to idle; an arm that has not slowed down half a
-//! second after a velocity fault switches it to the emergency stop. Faults stay on the pendant until Shift-Idle.
-//! It sends the motors their mode in a frame to all actuators (0x540), whose payload is not published: here it
-//! sets MODE. Source: libbarrett, btclient, OWD.
+//! The module receives torque commands and position replies. In active mode, it switches to idle if a torque or a speed is
+//! above its fault limit, the bus voltage is outside its limits, or positions are missing. It switches to the emergency stop
+//! if the arm has not slowed down half a second after a velocity fault. The pendant shows a fault until Shift-Idle. The
+//! module sends the motors their mode in a frame to all actuators (0x540), whose payload is not published; the emulated
+//! frame sets MODE. Source: libbarrett, btclient, OWD.
 
 use crate::config::SafetyConfig;
 use crate::elbow::monitored_points_m;
@@ -30,7 +30,7 @@ const HISTORY: usize = 5;
 /// Limits of the bus voltage \[V\]: VOLTL1, VOLTL2, VOLTH1, VOLTH2.
 const VOLTAGE_V: [i32; 4] = [36, 30, 54, 57];
 
-/// Action of an operator at the pendant.
+/// Action of an operator on the pendant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ButtonPress {
     /// Shift-Idle: clears the faults; the motors have power and brake.
@@ -46,7 +46,7 @@ pub enum ButtonPress {
 /// Cause of the module's last change of mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// The operator, at the pendant.
+    /// The operator, on the pendant.
     Operator,
     /// A request of the host.
     Host,
@@ -86,8 +86,8 @@ pub struct SafetyModule {
 }
 
 impl SafetyModule {
-    /// A module in the emergency stop, for an arm of `joints` pucks, with the transmission of joints 1 to 4.
-    /// `None` if the property ids of its firmware are not known.
+    /// Creates a module in emergency stop for an arm with `joints` pucks and the transmission of joints 1 to 4; `None` if the
+    /// property ids of its firmware are not known.
     pub fn new(
         config: SafetyConfig,
         joints: usize,
@@ -377,7 +377,7 @@ impl SafetyModule {
         self.watch_speed(now_ns, speed)
     }
 
-    /// `speed` in the units of VL1 and VL2.
+    /// Checks a speed, in the units of VL1 and VL2.
     fn watch_speed(&mut self, now_ns: u64, speed: f64) -> Option<CanFrame> {
         if self.limit(Property::ZERO) == 0 {
             return None;

@@ -1,7 +1,7 @@
-//! The force/torque sensor behind the tip.
+//! Emulated force/torque sensor behind the tip.
 //!
-//! It answers a request with a frame of forces and one of torques, both in its own axes, which are the tip's.
-//! Taring takes a little over a second, during which the outputs are zero and the status reports taring. Source:
+//! The sensor answers a request with a frame of forces and a frame of torques, both in the sensor's axes, which are the axes
+//! of the tip. Taring takes slightly more than a second, during which the outputs are zero and the status reports taring. Source:
 //! btclient, OWD.
 
 use crate::store::property_of;
@@ -13,7 +13,7 @@ use supple_puck::{
     Destination, GroupId, MessageId, NodeId, Property, PropertyMessage, PropertyTable, Value,
 };
 
-/// Time that taring takes \[ns\].
+/// Duration of taring \[ns\].
 const TARE_NS: u64 = 1_100_000_000;
 /// Offset from the centre of the sensor to the tip, in the sensor's axes \[m\].
 const SENSOR_TO_TIP_M: Vector3<f64> = Vector3::new(0.0, 0.0, 0.026);
@@ -31,7 +31,7 @@ pub struct ForceSensor {
 }
 
 impl ForceSensor {
-    /// A sensor that is not taring.
+    /// Creates a sensor that is not taring.
     pub fn new() -> ForceSensor {
         ForceSensor {
             taring_until_ns: 0,

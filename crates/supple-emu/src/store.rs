@@ -1,4 +1,4 @@
-//! Property values, and the mapping from ids to properties.
+//! Stored property values, and the mapping from ids to properties.
 
 use std::collections::BTreeMap;
 use supple_puck::property::Slot;
@@ -9,7 +9,7 @@ use supple_puck::{Property, PropertyId, PropertyTable};
 pub struct PropertyStore(BTreeMap<Property, i32>);
 
 impl PropertyStore {
-    /// Value of a property; `None` if it was never set.
+    /// Returns the value of a property; `None` if it was never set.
     pub fn get(&self, property: Property) -> Option<i32> {
         self.0.get(&property).copied()
     }
@@ -20,7 +20,7 @@ impl PropertyStore {
     }
 }
 
-/// Property of an id in a firmware.
+/// Returns the property that an id has in a firmware.
 pub fn property_of(table: &PropertyTable, id: PropertyId) -> Option<Property> {
     match table.slot(id) {
         Slot::Property(property) => Some(property),

@@ -1,4 +1,4 @@
-//! Model of the bus medium: one frame at a time, for the duration of its bits.
+//! Model of the bus medium, which carries one frame at a time for the duration of its bits.
 //!
 //! When the bus is free, the waiting frame with the lowest id starts; a frame that has started is not
 //! interrupted. Bus errors and retransmissions are not modelled.
@@ -7,7 +7,7 @@ use supple_can_frame::{BitRates, CanFrame};
 
 /// A waiting frame.
 #[derive(Clone, Copy, Debug)]
-struct Waiting {
+struct QueuedFrame {
     ready_ns: u64,
     frame: CanFrame,
 }
@@ -16,7 +16,7 @@ struct Waiting {
 #[derive(Clone, Debug)]
 pub struct Wire {
     rates: BitRates,
-    waiting: Vec<Waiting>,
+    waiting: Vec<QueuedFrame>,
     /// The current frame and its end time \[ns\].
     current: Option<(CanFrame, u64)>,
     free_ns: u64,
@@ -24,7 +24,7 @@ pub struct Wire {
 }
 
 impl Wire {
-    /// A free bus with these bit rates.
+    /// Creates a free bus with these bit rates.
     pub fn new(rates: BitRates) -> Wire {
         Wire {
             rates,
@@ -35,14 +35,14 @@ impl Wire {
         }
     }
 
-    /// Queues a frame for transmission from `ready_ns` on. Frames of one node with the same time keep their
-    /// order.
+    /// Queues a frame for transmission from `ready_ns` on. Frames of one node with equal times are sent in the order of the
+    /// calls.
     pub fn queue(&mut self, ready_ns: u64, frame: CanFrame) {
-        self.waiting.push(Waiting { ready_ns, frame });
+        self.waiting.push(QueuedFrame { ready_ns, frame });
     }
 
-    /// End time of the current or next frame \[ns\], if any. A frame queued later may go first only if this one
-    /// has not started.
+    /// Returns the end time of the current or next frame \[ns\], if any. A frame that is queued later can be sent first only if
+    /// this frame has not started.
     pub fn next_end_ns(&self) -> Option<u64> {
         match (self.current, self.next()) {
             (Some((_, end_ns)), _) => Some(end_ns),
@@ -74,7 +74,7 @@ impl Wire {
         }
     }
 
-    /// Pauses for `gap_ns`: discards all waiting frames; a frame in transmission ends later by as much.
+    /// Pauses for `gap_ns`: discards all waiting frames and delays the end of a frame in transmission by `gap_ns`.
     pub fn pause(&mut self, gap_ns: u64) {
         self.waiting.clear();
         self.free_ns += gap_ns;
@@ -83,7 +83,7 @@ impl Wire {
         }
     }
 
-    /// Discards the waiting frames of which this is true.
+    /// Discards the waiting frames for which `is_discarded` returns true.
     pub fn discard(&mut self, is_discarded: impl Fn(&CanFrame) -> bool) {
         self.waiting.retain(|waiting| !is_discarded(&waiting.frame));
     }
@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pause_discards_what_waits_and_lets_what_has_begun_end_later() {
+    fn a_pause_discards_waiting_frames_and_delays_the_end_of_the_current_frame() {
         let mut wire = Wire::new(BitRates::CLASSIC_1M);
         wire.queue(0, frame(0x423, 3));
         let end_ns = wire.next_end_ns().unwrap();
@@ -165,9 +165,9 @@ mod tests {
         assert_eq!(run(&mut wire).len(), 1);
     }
 
-    /// Barrett's 75 us for a position reply lies between no stuffing and the maximum.
+    /// Barrett's 75 us for a position reply lie between the durations without and with maximum stuffing.
     #[test]
-    fn a_position_reply_lasts_for_its_bits() {
+    fn the_duration_of_a_position_reply_is_that_of_its_bits() {
         let ns = BitRates::CLASSIC_1M.duration_ns(&frame(0x423, 3));
         assert!((71_000..=85_000).contains(&ns), "{ns}");
     }

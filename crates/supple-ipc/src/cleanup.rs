@@ -1,12 +1,12 @@
 //! The last process that leaves a system removes all remaining shared-memory objects.
 //!
 //! iceoryx2 removes the objects of closed ports and of killed processes, but not its own management files. When no
-//! process of the system is left, this module removes all of the system's objects. The membership lock keeps processes
-//! from joining meanwhile.
+//! process of the system is left, this module removes all of the system's objects. It holds the membership lock, so that no
+//! process joins during the removal.
 //!
-//! iceoryx2 0.9.3 leaves the empty node folder of each process that has ended, and lists all of them whenever a process joins: with
-//! 8,500 of them an operator was connected after 33 ms instead of 6 ms. A process that leaves removes the empty node folders of all
-//! systems that are older than a minute.
+//! iceoryx2 0.9.3 leaves the empty node folder of each process that has ended, and lists all node folders whenever a process joins:
+//! with 8,500 folders, an operator was connected after 33 ms instead of 6 ms. A process that leaves therefore removes the
+//! empty node folders of all systems that are older than a minute.
 
 use crate::domain::{Domain, Node};
 use crate::membership;
@@ -18,7 +18,7 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-/// Age from which an empty folder of a node is removed: a process that joins has files in its own folder within microseconds.
+/// Age from which an empty node folder is removed. A process that joins creates files in its folder within microseconds.
 const ABANDONED_AFTER: Duration = Duration::from_secs(60);
 
 /// Guard stored as the last field of every struct with ports, so that it is dropped after them.
@@ -39,7 +39,7 @@ impl Drop for SharedMemoryCleanup {
 }
 
 fn clear(domain: &Domain) -> io::Result<()> {
-    // If other processes keep the lock busy, the last of them cleans up.
+    // If another process holds the lock for longer than the timeout, the last process to leave cleans up.
     let Some(_membership_lock) = membership::try_lock_to_leave(domain)? else {
         return Ok(());
     };
@@ -52,7 +52,7 @@ fn clear(domain: &Domain) -> io::Result<()> {
                 // Objects that this call misses are removed below, once no node is left.
                 let _ = node.try_remove_stale_resources();
             }
-            // We hold the membership lock, so the process of this node cannot be joining: it was killed while it joined.
+            // This process holds the membership lock, so the process of this node is not joining: it was killed while it joined.
             NodeState::Undefined(_) => {}
             NodeState::Alive(_) | NodeState::Inaccessible(_) => has_live_node = true,
         }
@@ -70,7 +70,7 @@ fn clear(domain: &Domain) -> io::Result<()> {
 /// Removes the empty folders of nodes that have ended.
 fn remove_abandoned_folders(domain: &Domain) {
     let nodes = domain.config().global.node_dir().to_string();
-    // What cannot be read or removed stays; the next process that leaves tries again.
+    // Folders that cannot be read or removed stay; the next process that leaves tries again.
     let Ok(entries) = fs::read_dir(Path::new(&nodes)) else {
         return;
     };

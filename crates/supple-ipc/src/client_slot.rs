@@ -1,9 +1,9 @@
-//! Slots for clients: a fixed number per kind, each held by a file lock, which the kernel releases when the process
-//! ends.
+//! Client slots: a fixed number for each kind of client. A client holds its slot by a file lock, which the kernel releases
+//! when the process ends.
 //!
-//! iceoryx2 has one pool of subscriber and publisher slots, which hung clients could exhaust. Here general clients get
-//! one part of the pool and the programs that run the system another. If a part is exhausted, the error names the
-//! processes that hold it.
+//! iceoryx2 has one pool of subscriber and publisher slots, which hung clients could exhaust. Therefore general
+//! clients get one part of the pool, and the programs that run the system get the other. If a part is exhausted, the error
+//! names the processes that hold its slots.
 
 use crate::domain::Domain;
 use crate::error::IpcError;
@@ -44,7 +44,7 @@ impl ClientSlot {
     /// Acquires a free slot.
     ///
     /// # Errors
-    /// [`IpcError::NoFreeSlot`] if all are in use.
+    /// [`IpcError::NoFreeSlot`] if all slots of the kind are in use.
     pub fn acquire(domain: &Domain, kind: &SlotKind) -> Result<ClientSlot, IpcError> {
         let free = || first_free(domain, kind).map_err(|error| failed(kind.name, &error));
         if let Some(slot) = free()? {
@@ -79,7 +79,7 @@ fn first_free(domain: &Domain, kind: &SlotKind) -> io::Result<Option<ClientSlot>
     Ok(None)
 }
 
-/// Ids of the processes that hold the slots.
+/// Returns the ids of the processes that hold the slots.
 fn holders(domain: &Domain, kind: &SlotKind) -> Vec<String> {
     let mut holders = Vec::new();
     for index in 0..kind.slots {
@@ -109,12 +109,12 @@ mod tests {
         let domain = Domain::in_folder(&folder.path().join("run"), "slots").expect("a domain");
         let one = ClientSlot::acquire(&domain, &SLOTS).expect("free");
         let _two = ClientSlot::acquire(&domain, &SLOTS).expect("free");
-        let error = ClientSlot::acquire(&domain, &SLOTS).expect_err("all are in use");
+        let error = ClientSlot::acquire(&domain, &SLOTS).expect_err("all slots are in use");
         let process = std::process::id().to_string();
         for part in ["2", "tests", process.as_str()] {
             assert!(error.to_string().contains(part), "{part}: {error}");
         }
         drop(one);
-        ClientSlot::acquire(&domain, &SLOTS).expect("it was released");
+        ClientSlot::acquire(&domain, &SLOTS).expect("the slot was released");
     }
 }

@@ -1,11 +1,11 @@
 //! The namespace of one system: its folder and the names of its shared-memory objects.
 //!
-//! A system is identified by its prefix: processes of the same user under the same prefix are connected, others are
-//! not. Only the user can access the folder of sockets and service files, and the shared memory. Nothing is ever sent
+//! A system is identified by its prefix: processes of the same user with the same prefix are connected to each
+//! other, and to no other process. Only the user can access the folder of sockets and service files, and the shared memory. Nothing is ever sent
 //! over a network.
 
 use crate::error::IpcError;
-use crate::home_files::HomeFiles;
+use crate::home_pose_confirmation::HomePoseConfirmation;
 use iceoryx2::prelude::*;
 use std::path::{Path as StdPath, PathBuf};
 use supple_realtime::{PrivateFolderError, open_private_folder, runtime_folder};
@@ -34,11 +34,11 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// Opens the system with this prefix; the default is the value of [`PREFIX_VARIABLE`], or else [`DEFAULT_PREFIX`].
-    /// Its folder is `$XDG_RUNTIME_DIR/supple`, or `/tmp/supple-<uid>` if the variable is not set.
+    /// Opens the system with this prefix; the default is the value of [`PREFIX_VARIABLE`], otherwise
+    /// [`DEFAULT_PREFIX`]. The folder of the system is `$XDG_RUNTIME_DIR/supple`, or `/tmp/supple-<uid>` if the variable is not set.
     ///
     /// # Errors
-    /// [`IpcError::Prefix`], [`IpcError::Folder`].
+    /// [`IpcError::Prefix`] for an invalid prefix, [`IpcError::Folder`] if the folder cannot be used.
     pub fn new(prefix: Option<&str>) -> Result<Domain, IpcError> {
         let from_environment = std::env::var(PREFIX_VARIABLE).ok();
         let prefix = prefix
@@ -50,7 +50,7 @@ impl Domain {
     /// Opens the system with this prefix in the given folder.
     ///
     /// # Errors
-    /// [`IpcError::Prefix`], [`IpcError::Folder`].
+    /// [`IpcError::Prefix`] for an invalid prefix, [`IpcError::Folder`] if the folder cannot be used.
     pub fn in_folder(folder: &StdPath, prefix: &str) -> Result<Domain, IpcError> {
         let allowed = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "-_".contains(c);
         if prefix.is_empty() || prefix.len() > 32 || !prefix.chars().all(allowed) {
@@ -94,14 +94,15 @@ impl Domain {
         &self.folder
     }
 
-    /// Folder in which the controller keeps its arm with what it has learned.
+    /// Folder in which the controller stores the description of its arm with the learned terms.
     pub fn learned_folder(&self) -> PathBuf {
         self.folder.join(format!("learned-{}", self.prefix))
     }
 
-    /// Files of the question whether the arm is in its home pose, after it has lost its positions.
-    pub fn home_files(&self) -> HomeFiles {
-        HomeFiles::of(&self.folder, &self.prefix)
+    /// Returns the files through which the operator confirms that the arm is in its home pose, after it has lost its position
+    /// reference.
+    pub fn home_files(&self) -> HomePoseConfirmation {
+        HomePoseConfirmation::of(&self.folder, &self.prefix)
     }
 
     pub(crate) fn config(&self) -> &Config {
@@ -130,7 +131,7 @@ fn open_folder(folder: &StdPath) -> Result<(), IpcError> {
             PrivateFolderError::NoFolder | PrivateFolderError::OtherUser { .. } => {
                 "remove it, or set XDG_RUNTIME_DIR to a folder of your own"
             }
-            PrivateFolderError::OpenToOthers { .. } => "chmod 700 it",
+            PrivateFolderError::OpenToOthers { .. } => "restrict it with chmod 700",
         },
         cause: format!("it {error}"),
     })

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 /// Error of setting up or using shared memory.
 #[derive(Debug, thiserror::Error)]
 pub enum IpcError {
-    /// A prefix that cannot be part of a file name.
+    /// The prefix cannot be part of a file name.
     #[error(
         "the prefix `{found}` cannot be used: give 1 to 32 of a-z, 0-9, `-` and `_` with --prefix or \
          SUPPLE_PREFIX"
@@ -22,12 +22,12 @@ pub enum IpcError {
         folder: PathBuf,
         /// Cause.
         cause: String,
-        /// What the user can do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// Another process is already the writer of this service.
     #[error(
-        "another process already writes {service} under the prefix `{prefix}`: end it, or choose another \
+        "another process already writes {service} under the prefix `{prefix}`: end that process, or choose another \
          --prefix"
     )]
     SecondWriter {
@@ -37,7 +37,9 @@ pub enum IpcError {
         prefix: String,
     },
     /// The maximum number of readers is connected.
-    #[error("{service} has the maximum number of readers: end one, such as a `supple status`")]
+    #[error(
+        "{service} has the maximum number of readers: end one of them, such as a `supple status`"
+    )]
     TooManyReaders {
         /// Name of the service.
         service: String,
@@ -55,7 +57,7 @@ pub enum IpcError {
         /// Ids of the processes that hold them.
         holders: String,
     },
-    /// The other process uses another version of the message type.
+    /// Another process uses another version of the message type.
     #[error(
         "{service} was created by another version of this software (this version expects the type {expected}); \
          end all processes under the prefix `{prefix}` and start them from one build"
@@ -68,7 +70,7 @@ pub enum IpcError {
         /// The prefix.
         prefix: String,
     },
-    /// Not enough shared memory for the ports of a process.
+    /// The free shared memory is not enough for the ports of a process.
     #[error(
         "/dev/shm has {} MB free, {} MB are needed: delete unused files there, or enlarge it \
          (mount -o remount,size=256M /dev/shm; for a container --shm-size=256m)",
@@ -94,14 +96,16 @@ pub enum IpcError {
         prefix: String,
     },
     /// Any other error of iceoryx2.
-    #[error("{service}: {cause}; `ls /dev/shm` shows what is there, a reboot clears it")]
+    #[error(
+        "{service}: {cause}; `ls /dev/shm` lists the shared-memory objects, a reboot removes them"
+    )]
     Service {
         /// Name of the service or the operation.
         service: String,
         /// Error of iceoryx2.
         cause: String,
     },
-    /// A message for another arm, or an invalid one.
+    /// A message is for another arm, or is invalid.
     #[error(transparent)]
     Message(#[from] MessageError),
 }

@@ -1,8 +1,8 @@
-//! Idle requests over a separate socket: one datagram to the controller, one datagram back.
+//! Idle requests through a separate socket: the client sends one datagram, the controller answers with one datagram.
 //!
 //! An idle request uses no reader or operator slot, no shared memory, no lock and no queue, so hung clients, a full
 //! `/dev/shm` or a process stopped while it joins cannot block it. Simultaneous requests are identical and are merged,
-//! so none is ever refused for lack of space. Only the owner can open the socket, which is in the system's folder.
+//! so no request is refused for lack of space. Only the owner can open the socket, which is in the system's folder.
 
 use crate::domain::Domain;
 use crate::error::IpcError;
@@ -24,19 +24,19 @@ use supple_core::controller::Mode;
 
 /// Header of a request.
 const REQUEST_HEADER: &[u8; 8] = b"idle.v1\n";
-/// Length of a request: the header and the request id \[bytes\].
+/// Length of a request \[bytes\]: header and request id.
 const REQUEST_BYTES: usize = 16;
-/// Length of a reply without its text: request id, cycle, outcome, mode \[bytes\].
+/// Length of a reply without its text \[bytes\]: request id, cycle, outcome, mode.
 const REPLY_HEADER_BYTES: usize = 18;
-/// Maximum number of clients waiting for a reply. Beyond it the oldest client gets no reply; its request is carried out
-/// all the same.
+/// Maximum number of clients waiting for a reply. If more clients wait, the oldest one gets no reply, but the controller
+/// still executes its request.
 const MAX_PENDING_CLIENTS: usize = 64;
 /// Time after which a client repeats its request.
 const RETRY_INTERVAL: Duration = Duration::from_millis(100);
 /// Time between attempts to send while the controller's receive buffer is full.
 const SEND_RETRY_INTERVAL: Duration = Duration::from_millis(1);
 
-/// Path of the socket of idle requests.
+/// Returns the path of the socket for idle requests.
 pub fn idle_socket(domain: &Domain) -> PathBuf {
     let name = format!("{}.idle.socket", domain.prefix());
     domain.folder().join(name)
@@ -49,7 +49,7 @@ pub struct IdleAnswer {
     pub cycle: u64,
     /// Whether the controller accepted it.
     pub outcome: Outcome,
-    /// Mode after the request, if this version has it.
+    /// Mode after the request; `None` if this version does not know its code.
     pub mode: Option<Mode>,
     /// Reason for a refusal; empty otherwise.
     pub text: String,
@@ -95,14 +95,14 @@ impl IdleServer {
         })
     }
 
-    /// Creates the socket anew if something has removed its file, such as a program that cleans /tmp: nobody could reach the
-    /// old one any more. Returns whether it did.
+    /// Creates a new socket if another program, such as one that cleans /tmp, has removed the file of the socket, which no
+    /// client could reach any more. Returns whether it created one.
     pub fn restore(&mut self) -> bool {
         let is_gone = |error: io::Error| error.kind() == ErrorKind::NotFound;
         if !fs::symlink_metadata(&self.path).is_err_and(is_gone) {
             return false;
         }
-        // If this fails, as without the folder, the next call tries again.
+        // If this fails, for example because the folder is missing, the next call tries again.
         match bind(&self.path) {
             Ok(socket) => {
                 self.socket = socket;
@@ -112,11 +112,11 @@ impl IdleServer {
         }
     }
 
-    /// Waits for requests for at most `timeout`, reads all pending ones, and labels them with the batch number `batch`.
-    /// Returns whether there were any.
+    /// Waits for requests for at most `timeout`, reads all pending requests, and labels them with the batch number `batch`.
+    /// Returns whether any request arrived.
     ///
     /// # Errors
-    /// [`IpcError::Service`].
+    /// [`IpcError::Service`] if the socket fails.
     pub fn receive_requests(&mut self, batch: u64, timeout: Duration) -> Result<bool, IpcError> {
         let timeout = Timespec::try_from(timeout).unwrap_or_default();
         let mut sockets = [PollFd::new(&self.socket, PollFlags::IN)];
@@ -126,7 +126,7 @@ impl IdleServer {
             Err(error) => return Err(failed("idle", &error.into())),
         }
         let mut any = false;
-        // At most as many as fit into `pending`; the next call reads the rest.
+        // One call reads at most as many requests as fit into `pending`; the next call reads the rest.
         for _ in 0..MAX_PENDING_CLIENTS {
             let mut request = [0; REQUEST_BYTES + 1];
             match self.socket.recv_from(&mut request) {
@@ -143,7 +143,7 @@ impl IdleServer {
                     });
                     any = true;
                 }
-                // Not a request: ignored.
+                // Datagrams that are not requests are ignored.
                 Ok(_) => {}
                 Err(error) if error.kind() == ErrorKind::WouldBlock => break,
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
@@ -205,8 +205,7 @@ pub fn request_idle(domain: &Domain, timeout: Duration) -> Result<Option<IdleAns
 fn request_idle_at(path: &Path, timeout: Duration) -> io::Result<Option<IdleAnswer>> {
     let start = Instant::now();
     let request_id = random_id()?;
-    // An abstract address: it needs no disk space and cannot be guessed. A connected socket receives from its peer
-    // only.
+    // The abstract address needs no disk space and cannot be guessed. A connected socket receives only from its peer.
     let address = SocketAddr::from_abstract_name(format!("supple-idle-{request_id:016x}"))?;
     let request_id = request_id.to_le_bytes();
     let socket = UnixDatagram::bind_addr(&address)?;
@@ -219,7 +218,7 @@ fn request_idle_at(path: &Path, timeout: Duration) -> io::Result<Option<IdleAnsw
         let wait = match sent {
             Ok(_) => RETRY_INTERVAL,
             Err(error) => match error.kind() {
-                // The receive buffer is full of identical requests, so idle will happen; retry to get a reply.
+                // The receive buffer is full of identical requests, so the controller will enter idle; retry to get a reply.
                 ErrorKind::WouldBlock => SEND_RETRY_INTERVAL,
                 ErrorKind::NotFound | ErrorKind::ConnectionRefused | ErrorKind::NotConnected => {
                     return Ok(None);
@@ -262,7 +261,7 @@ fn receive_reply(
                 }
             }
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
-            // No reply yet; or the controller has terminated, and the next attempt to connect fails.
+            // No reply has arrived yet, or the controller has terminated and the next attempt to connect fails.
             Err(_) => return Ok(None),
         }
     }
@@ -282,7 +281,7 @@ fn decode_reply(datagram: &[u8], request_id: &[u8; 8]) -> Option<IdleAnswer> {
     })
 }
 
-/// Reply to all idle requests up to a batch number.
+/// Creates the reply to all idle requests up to a batch number.
 pub fn idle_reply(
     batch: u64,
     cycle: u64,
@@ -390,10 +389,10 @@ mod tests {
     }
 
     #[test]
-    fn a_socket_whose_file_is_removed_is_created_anew() {
+    fn restore_creates_a_new_socket_if_its_file_is_removed() {
         let (_folder, domain) = system();
         let mut server = IdleServer::new(&domain).expect("a server");
-        assert!(!server.restore(), "it is there");
+        assert!(!server.restore(), "the file exists");
         fs::remove_file(idle_socket(&domain)).expect("removed");
         assert!(!idle_socket_is_open(&domain));
         assert!(server.restore());
@@ -406,9 +405,9 @@ mod tests {
         assert!(server.receive_requests(1, TIMEOUT).expect("read"));
     }
 
-    /// What somebody else has put there is not replaced.
+    /// The server does not replace a file that another program has created at the path of the socket.
     #[test]
-    fn another_file_in_its_place_stays() {
+    fn restore_keeps_a_foreign_file_at_the_path_of_the_socket() {
         let (_folder, domain) = system();
         let mut server = IdleServer::new(&domain).expect("a server");
         fs::remove_file(idle_socket(&domain)).expect("removed");

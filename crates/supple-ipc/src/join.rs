@@ -1,4 +1,4 @@
-//! How a process joins a system.
+//! Joining of a process to a system.
 
 use crate::cleanup::SharedMemoryCleanup;
 use crate::domain::{Domain, Node};
@@ -28,7 +28,7 @@ impl Domain {
                 _ => "set XDG_RUNTIME_DIR to a folder that can be written",
             },
         })?;
-        // The lock is released below, before the guard can be dropped: its drop takes the lock itself.
+        // The lock is released below, before the guard can be dropped: dropping the guard acquires the lock.
         let cleanup = SharedMemoryCleanup::of(self);
         let opened = self.open(messages_bytes, open);
         drop(membership_lock);

@@ -9,13 +9,13 @@
 //! | `operator_request` | [`OperatorRequest`](message::OperatorRequest) | up to 8 operators | the controller |
 //! | `operator_reply` | [`OperatorReply`](message::OperatorReply) | the controller | up to 8 |
 //!
-//! The services are iceoryx2 publish-subscribe services. Each has exactly one writer, except `operator_request`, whose
-//! messages the controller checks before it acts on them. A writer holds a file lock and puts a random id into each
+//! The services are iceoryx2 publish-subscribe services. Each service has exactly one writer, except `operator_request`,
+//! whose messages the controller checks before it acts on them. A writer holds a file lock and puts a random id into each
 //! message; readers of states and commands discard messages with another id. Of the 8 telemetry readers and the 8
 //! operators, 5 are general clients and 3 slots are reserved for the programs that run the system. Idle requests use a
-//! separate socket ([`request_idle`]) and need no slot. Publishing and receiving allocate nothing; all memory is
-//! allocated at the start. Only one user can access a system, and a prefix separates it from other systems, see
-//! [`Domain`]; a peer of another version is refused ([`IpcError::Version`]).
+//! separate socket ([`request_idle`]) and need no slot. Publishing and receiving allocate no memory; all memory
+//! is allocated at the start. Only one user can access a system, and a prefix separates it from other systems, see
+//! [`Domain`]. A process with another version of the messages is refused ([`IpcError::Version`]).
 //!
 //! ```
 //! use core::time::Duration;
@@ -40,7 +40,7 @@ mod cleanup;
 mod client_slot;
 mod domain;
 mod error;
-mod home_files;
+mod home_pose_confirmation;
 mod idle;
 mod join;
 mod link;
@@ -54,7 +54,7 @@ mod writer_identity;
 
 pub use domain::{DEFAULT_PREFIX, Domain, PREFIX_VARIABLE};
 pub use error::IpcError;
-pub use home_files::HomeFiles;
+pub use home_pose_confirmation::HomePoseConfirmation;
 pub use idle::{
     IdleAnswer, IdleServer, idle_reply, idle_socket, idle_socket_is_open, request_idle,
 };

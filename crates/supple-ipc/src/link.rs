@@ -1,11 +1,12 @@
-//! The control path: arm states from plant to controller, torque commands back, each with a wake-up socket.
+//! The control path: arm states from the plant to the controller and torque commands from the controller to the plant, each
+//! with a wake-up socket.
 //!
 //! The plant owns the clock: it publishes a state and wakes the controller; the controller answers with the command of
 //! the same cycle. Every wait has a timeout. If both processes share a processor, any work that the controller does
-//! after its answer delays the plant. The plant therefore wakes the controller once more shortly before each state, and
-//! the controller does its other work then. The controller notifies the plant only if the plant is blocked: before it
-//! blocks, the plant publishes a [`WakeRequest`] and then checks for the answer once more. So either the plant sees the
-//! answer, or the controller sees the request.
+//! after its answer delays the plant. The plant therefore also wakes the controller shortly before each state, and the
+//! controller does its other work then. The controller notifies the plant only if the plant is blocked: before it
+//! blocks, the plant publishes a [`WakeRequest`] and then checks for the answer again. Therefore either the plant reads the
+//! answer, or the controller reads the request.
 
 use crate::cleanup::SharedMemoryCleanup;
 use crate::domain::Domain;
@@ -19,7 +20,8 @@ use core::sync::atomic::{Ordering, fence};
 use core::time::Duration;
 use std::time::Instant;
 
-/// The queue lets a late controller process every missed state, so that its velocity estimate has no gaps.
+/// Parameters of the service of arm states. Its queue lets a late controller process every missed state, so that the
+/// velocity estimate has no gaps.
 const STATES: QualityOfService = QualityOfService {
     name: "arm_state",
     writers: 1,
@@ -47,10 +49,10 @@ const MAX_FOREIGN_PER_CALL: u32 = 64;
 const STATE_WAKE_SOCKET: &str = "arm_state";
 const COMMAND_WAKE_SOCKET: &str = "torque_command";
 
-/// The plant's end of the control path, in `supple-sim` or `supple-can`. It stays in the thread that created it.
+/// The plant's side of the control path, in `supple-sim` or `supple-can`. Only the thread that created it can use it.
 #[derive(Debug)]
 pub struct PlantLink {
-    // Dropped before the writer lock; otherwise it would remove the socket of the next plant.
+    // This field is dropped before the writer lock; otherwise it would remove the socket of the next plant.
     wake_receiver: WakeReceiver,
     wake_sender: WakeSender,
     states: Writer<ArmState>,
@@ -58,7 +60,7 @@ pub struct PlantLink {
     wake_requests: Writer<WakeRequest>,
     controller: WriterFilter,
     spin: Duration,
-    /// A wake-up was requested and not consumed.
+    /// Whether a wake-up was requested and has not been consumed.
     wakeup_pending: Cell<bool>,
     _cleanup: SharedMemoryCleanup,
 }
@@ -70,7 +72,7 @@ pub struct ReceivedAnswer {
     pub answer: Option<TorqueCommand>,
     /// Number of answers to earlier cycles, which are discarded.
     pub late: u64,
-    /// A wait ended without a wake-up: by its timeout, or by a signal.
+    /// Whether a wait ended without a wake-up, by its timeout or by a signal.
     pub timed_out: bool,
 }
 
@@ -106,8 +108,8 @@ impl PlantLink {
         })
     }
 
-    /// Sets how long [`PlantLink::answer`] polls for the answer before it blocks. Many answers come sooner than a
-    /// blocked thread can be woken. Polling uses the processor for up to this time in each cycle.
+    /// Sets the time for which [`PlantLink::answer`] polls for the answer before it blocks. Many answers arrive sooner than a
+    /// blocked thread can be woken. Polling occupies the processor for up to this time in each cycle.
     pub fn spin(&mut self, at_most: Duration) {
         self.spin = at_most;
     }
@@ -131,8 +133,8 @@ impl PlantLink {
         self.controller.dropped()
     }
 
-    /// Notifies the controller that a state follows within some tens or hundreds of microseconds, so that it can do its
-    /// other work before that. Optional.
+    /// Notifies the controller that a state follows within some tens or hundreds of microseconds, so that the controller can do
+    /// other work first. Calling this is optional.
     ///
     /// # Errors
     /// [`IpcError::Service`].
@@ -144,7 +146,7 @@ impl PlantLink {
         Ok(())
     }
 
-    /// Discards a wake-up that was requested and not consumed.
+    /// Discards a wake-up that was requested and has not been consumed.
     fn discard_wakeups(&self) -> Result<(), IpcError> {
         match self.wakeup_pending.replace(false) {
             true => self.wake_receiver.discard_wakeups(),
@@ -160,8 +162,8 @@ impl PlantLink {
         self.answer_within(cycle, || timeout)
     }
 
-    /// As [`PlantLink::answer`], but evaluates `timeout` only if the answer has not arrived yet. If both processes
-    /// share a processor it usually has, and then no clock is read.
+    /// Waits as [`PlantLink::answer`] does, but evaluates `timeout` only if the answer has not arrived yet. If both processes
+    /// share a processor, the answer has usually arrived, and no clock is read.
     ///
     /// # Errors
     /// [`IpcError::Service`].
@@ -224,11 +226,11 @@ pub enum WakeEvent {
     State(ArmState),
     /// A state follows soon, see [`PlantLink::announce`].
     Announced,
-    /// Neither came within the timeout.
+    /// Neither a state nor an announcement arrived within the timeout.
     Timeout,
 }
 
-/// The controller's end of the control path, in `supple-rt`. It stays in the thread that created it.
+/// The controller's side of the control path, in `supple-rt`. Only the thread that created it can use it.
 #[derive(Debug)]
 pub struct ControllerLink {
     // Field order as in [`PlantLink`]: the socket is dropped before the writer lock.
@@ -238,7 +240,7 @@ pub struct ControllerLink {
     commands: Writer<TorqueCommand>,
     wake_requests: Reader<WakeRequest>,
     plant: WriterFilter,
-    /// The last read found the queue empty, so the wake-up of the next state is still to come.
+    /// Whether the last read found the queue empty, so that the next state causes a wake-up.
     queue_empty: Cell<bool>,
     _cleanup: SharedMemoryCleanup,
 }
@@ -256,7 +258,7 @@ impl ControllerLink {
         let (ports, cleanup) = domain.join(bytes, |node| {
             Ok((
                 Writer::new(domain, node, &COMMANDS, Backpressure::Drop)?,
-                // Opened before the states, so that no wake request for an answered state is missed.
+                // This reader is opened before the reader of states, so that it receives the wake request of every answered state.
                 Reader::new(domain, node, &WAKE_REQUESTS)?,
                 Reader::new(domain, node, &STATES)?,
                 WakeReceiver::new(domain, STATE_WAKE_SOCKET)?,
@@ -275,7 +277,7 @@ impl ControllerLink {
         })
     }
 
-    /// The oldest unread state, without waiting.
+    /// Returns the oldest unread state, without waiting.
     ///
     /// # Errors
     /// [`IpcError::Service`].
@@ -302,7 +304,8 @@ impl ControllerLink {
         self.plant.dropped()
     }
 
-    /// The oldest unread state; waits for one for at most `timeout`, which the kernel rounds to ticks of up to 10 ms.
+    /// Returns the oldest unread state; waits for a state for at most `timeout`, which the kernel rounds to ticks of up to
+    /// 10 ms.
     ///
     /// # Errors
     /// [`IpcError::Service`].
@@ -317,9 +320,8 @@ impl ControllerLink {
         }
     }
 
-    /// As [`ControllerLink::wait`], but also returns when a state is announced. It reads no clock until the first
-    /// spurious wake-up (a signal, or the wake-up of a state that was already read); the timeout restarts once at that
-    /// point.
+    /// Waits as [`ControllerLink::wait`] does, but also returns when a state is announced. Reads no clock until the first
+    /// spurious wake-up (a signal, or the wake-up of a state that was already read), at which the timeout restarts once.
     ///
     /// # Errors
     /// [`IpcError::Service`].
@@ -327,7 +329,7 @@ impl ControllerLink {
         let mut left = timeout;
         let mut first_spurious_wakeup = None;
         loop {
-            // If the queue was empty, block at once, so that a plant on the same processor can continue.
+            // If the queue was empty, this thread blocks at once, so that a plant on the same processor can continue.
             if !self.queue_empty.get() || left.is_zero() {
                 match self.receive()? {
                     Some(state) => return Ok(WakeEvent::State(state)),
@@ -337,7 +339,7 @@ impl ControllerLink {
             }
             match self.wake_receiver.wait_coarse(left)? {
                 WaitResult::Notified(WakeReason::Announced) => {
-                    // An extra read delays nobody at this point and warms the cache for the next one.
+                    // An additional read delays no process at this point, and loads the cache for the next read.
                     self.queue_empty.set(false);
                     return Ok(WakeEvent::Announced);
                 }

@@ -18,7 +18,7 @@ use supple_realtime::pause;
 
 /// Name of the lock file.
 const MEMBERSHIP_LOCK: &str = "membership";
-/// Timeout for the lock on joining. Others hold it for milliseconds, unless one of them was stopped (SIGSTOP).
+/// Timeout for the lock on joining. Other processes hold the lock for milliseconds, unless they are stopped (SIGSTOP).
 const MEMBERSHIP_LOCK_TIMEOUT: Duration = Duration::from_secs(10);
 /// Timeout for the lock on leaving.
 const LEAVE_LOCK_TIMEOUT: Duration = Duration::from_secs(1);

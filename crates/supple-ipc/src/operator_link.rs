@@ -1,9 +1,9 @@
-//! Telemetry, operator requests and replies: everything outside the control path.
+//! Telemetry, operator requests and replies: all messages outside the control path.
 //!
 //! The control loop's thread never uses these ports, so clients that connect and disconnect do not delay it.
 //!
-//! Only `operator_request` has several writers, because operators come and go. A request is not a command: the
-//! controller checks each one, and it is the only writer of replies, telemetry and torques.
+//! Only `operator_request` has several writers, because operators connect and disconnect. The controller checks every
+//! request before it executes it, and is the only writer of replies, telemetry and torques.
 
 use crate::cleanup::SharedMemoryCleanup;
 use crate::client_slot::{ClientSlot, SlotKind};
@@ -64,7 +64,7 @@ const SUPERVISOR_SLOTS: SlotKind = SlotKind {
     description: "programs that run the system",
     slots: 3,
 };
-/// Of programs that command a running system, one at a time; see [`CommandSlot`].
+/// Slot of programs that command a running system; only one program at a time, see [`CommandSlot`].
 const COMMANDER_SLOTS: SlotKind = SlotKind {
     name: "commander",
     description: "programs that command the system",
@@ -74,8 +74,8 @@ const _: () = assert!(VIEWER_SLOTS.slots + RECORDER_SLOTS.slots == TELEMETRY.rea
 const _: () = assert!(OPERATOR_SLOTS.slots + SUPERVISOR_SLOTS.slots == REQUESTS.writers);
 const _: () = assert!(REPLIES.readers == REQUESTS.writers);
 
-/// Poll interval of a waiting reader. Telemetry has no wake-up socket, so a client cannot slow the controller down
-/// through it.
+/// Poll interval of a waiting reader. Telemetry has no wake-up socket, through which a client could slow the controller
+/// down.
 const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
 /// The controller's ports for telemetry, requests and replies.
@@ -88,7 +88,7 @@ pub struct OperatorServer {
 }
 
 impl OperatorServer {
-    /// Joins as the controller. With [`Backpressure::Block`] a telemetry reader with a full queue blocks the
+    /// Joins the system as its controller. With [`Backpressure::Block`] a telemetry reader with a full queue blocks the
     /// controller.
     ///
     /// # Errors
@@ -122,7 +122,7 @@ impl OperatorServer {
         self.telemetry.send(telemetry).map(|_| ())
     }
 
-    /// The oldest unread request.
+    /// Returns the oldest unread request.
     ///
     /// # Errors
     /// [`IpcError::Service`].
@@ -139,7 +139,7 @@ impl OperatorServer {
     }
 }
 
-/// Reader of telemetry; counts lost cycles.
+/// Reader of telemetry; counts the cycles that it has lost.
 #[derive(Debug)]
 pub struct TelemetryReader {
     reader: Reader<Telemetry>,
@@ -150,7 +150,7 @@ pub struct TelemetryReader {
 }
 
 impl TelemetryReader {
-    /// Joins as a viewer; receives telemetry published from now on.
+    /// Joins the system as a viewer, which receives all telemetry published after this call.
     ///
     /// # Errors
     /// [`IpcError::NoFreeSlot`] if all 5 viewer slots are in use; other variants of [`IpcError`] if the port cannot be
@@ -159,10 +159,10 @@ impl TelemetryReader {
         TelemetryReader::of(domain, &VIEWER_SLOTS)
     }
 
-    /// As [`TelemetryReader::new`], but in a slot reserved for recorders.
+    /// Joins the system as [`TelemetryReader::new`] does, but in a slot reserved for recorders.
     ///
     /// # Errors
-    /// As [`TelemetryReader::new`], with 3 slots.
+    /// The same as those of [`TelemetryReader::new`]; there are 3 such slots.
     pub fn for_log(domain: &Domain) -> Result<TelemetryReader, IpcError> {
         TelemetryReader::of(domain, &RECORDER_SLOTS)
     }
@@ -181,7 +181,7 @@ impl TelemetryReader {
         })
     }
 
-    /// The oldest unread telemetry. A restart of the controller does not count as lost telemetry.
+    /// Returns the oldest unread telemetry. A restart of the controller does not count as lost telemetry.
     ///
     /// # Errors
     /// [`IpcError::Service`].
@@ -196,7 +196,7 @@ impl TelemetryReader {
         Ok(next)
     }
 
-    /// As [`TelemetryReader::receive`], but waits for at most `timeout`.
+    /// Returns the oldest unread telemetry; waits for it for at most `timeout`.
     ///
     /// # Errors
     /// [`IpcError::Service`].
@@ -219,19 +219,19 @@ impl TelemetryReader {
     }
 }
 
-/// The right to command a system continuously, which one program at a time has while others watch. An agreement between
-/// programs, such as those that use the Python package: the controller checks every request whoever sends it, and a
-/// person may intervene from the command line at any time. The kernel releases it when the process ends.
+/// The right to command a system continuously, which only one program at a time can hold. It is a convention between
+/// programs, such as those that use the Python package: the controller accepts requests from every operator, and a person
+/// may intervene from the command line at any time. The kernel releases the right when the process ends.
 #[derive(Debug)]
 pub struct CommandSlot {
     _slot: ClientSlot,
 }
 
 impl CommandSlot {
-    /// Takes the right to command.
+    /// Acquires the right to command.
     ///
     /// # Errors
-    /// [`IpcError::NoFreeSlot`] names the process that has it.
+    /// [`IpcError::NoFreeSlot`] with the process that holds the right.
     pub fn acquire(domain: &Domain) -> Result<CommandSlot, IpcError> {
         ClientSlot::acquire(domain, &COMMANDER_SLOTS).map(|slot| CommandSlot { _slot: slot })
     }
@@ -249,7 +249,7 @@ pub struct OperatorClient {
 }
 
 impl OperatorClient {
-    /// Joins as a general client.
+    /// Joins the system as a general client.
     ///
     /// # Errors
     /// [`IpcError::NoFreeSlot`] if all 5 general slots are in use; other variants of [`IpcError`] if the ports cannot
@@ -258,10 +258,10 @@ impl OperatorClient {
         OperatorClient::of(domain, &OPERATOR_SLOTS)
     }
 
-    /// As [`OperatorClient::new`], but in a slot reserved for the program that runs the system.
+    /// Joins the system as [`OperatorClient::new`] does, but in a slot reserved for the programs that run the system.
     ///
     /// # Errors
-    /// As [`OperatorClient::new`], with 3 slots.
+    /// The same as those of [`OperatorClient::new`]; there are 3 such slots.
     pub fn for_system(domain: &Domain) -> Result<OperatorClient, IpcError> {
         OperatorClient::of(domain, &SUPERVISOR_SLOTS)
     }
@@ -302,8 +302,8 @@ impl OperatorClient {
         Ok((readers > 0).then_some(self.sequence))
     }
 
-    /// The oldest unread reply to a request of this operator. A request that is queued until its cycle has two replies:
-    /// [`Outcome::Queued`](crate::message::Outcome::Queued) first.
+    /// Returns the oldest unread reply to a request of this operator. A request that is queued until its cycle has two replies,
+    /// the first with [`Outcome::Queued`](crate::message::Outcome::Queued).
     ///
     /// # Errors
     /// [`IpcError::Service`].

@@ -1,7 +1,8 @@
 //! One-way services in shared memory: a writer and readers.
 //!
-//! Once both sides are connected, writing and reading allocate nothing. When a side joins or leaves, the other makes a
-//! few system calls and allocations at its next call; therefore the control loop has only the ports to its plant.
+//! Once both sides are connected, writing and reading allocate nothing. When a side joins or leaves, the other side
+//! makes a few system calls and allocations in its next call. Therefore the thread of the control loop uses only the ports
+//! to the plant.
 
 use crate::domain::{Domain, Node};
 use crate::error::{IpcError, failed};
@@ -48,17 +49,17 @@ impl QualityOfService {
     }
 }
 
-/// Message header and its entries in the index queues, rounded up \[bytes\].
+/// Size of a message header and its entries in the index queues, rounded up \[bytes\].
 const HEADER_BYTES: usize = 64;
 
 /// Bounds of a message type.
 pub(crate) trait Message: Debug + Copy + ZeroCopySend + 'static {}
 impl<T: Debug + Copy + ZeroCopySend + 'static> Message for T {}
 
-/// What a writer does when a reader's queue is full and the oldest sample is not overwritten.
+/// Behaviour of a writer if a reader's queue is full and the oldest sample may not be overwritten.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Backpressure {
-    /// That reader does not get this sample.
+    /// The reader with the full queue does not get the sample.
     Drop,
     /// The writer blocks until the reader has space: for virtual time only.
     Block,
@@ -113,7 +114,7 @@ impl<T: Message> Writer<T> {
         self.writer_lock.as_ref().map_or(0, WriterLock::writer_id)
     }
 
-    /// Connects to new readers now, so that the next send does not have to.
+    /// Connects to new readers now, so that the next send does not spend time on it.
     pub fn connect(&self) -> Result<(), IpcError> {
         let connected = self.publisher.update_connections();
         connected.map_err(|error| failed(self.name, &error))
@@ -151,7 +152,7 @@ impl<T: Message> Reader<T> {
         })
     }
 
-    /// The oldest unread message.
+    /// Returns the oldest unread message.
     pub fn receive(&self) -> Result<Option<T>, IpcError> {
         let sample = self.subscriber.receive();
         let sample = sample.map_err(|error| failed(self.name, &error))?;
@@ -289,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn services_in_flux_are_retried_until_the_timeout() {
+    fn opening_is_retried_until_the_timeout_while_other_processes_create_or_remove_the_service() {
         assert_eq!(attempts(1, "in flux"), (Ok(()), 1));
         assert_eq!(attempts(3, "in flux"), (Ok(()), 3));
         let (opened, made) = attempts(u32::MAX, "in flux");

@@ -19,21 +19,21 @@ const MANAGEMENT_BYTES: u64 = 512 * 1024;
 
 /// Objects whose names have this system's prefix.
 #[derive(Debug, Default, PartialEq, Eq)]
-pub(crate) struct Objects {
+pub(crate) struct SharedObjects {
     /// Objects of this user.
     pub owned: Vec<PathBuf>,
-    /// Objects of other users, with the user id: never opened, never removed.
+    /// Objects of other users, with the user id. This process never opens or removes them.
     pub owned_by_others: Vec<(PathBuf, u32)>,
 }
 
-/// The objects of a system.
-pub(crate) fn objects(domain: &Domain) -> io::Result<Objects> {
+/// Lists the objects of a system.
+pub(crate) fn objects(domain: &Domain) -> io::Result<SharedObjects> {
     let user = rustix::process::getuid().as_raw();
     partition_by_owner(Path::new(FOLDER), &domain.object_prefix(), user)
 }
 
-fn partition_by_owner(folder: &Path, begin: &str, user: u32) -> io::Result<Objects> {
-    let mut objects = Objects::default();
+fn partition_by_owner(folder: &Path, begin: &str, user: u32) -> io::Result<SharedObjects> {
+    let mut objects = SharedObjects::default();
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
         let name = entry.file_name();
@@ -42,7 +42,7 @@ fn partition_by_owner(folder: &Path, begin: &str, user: u32) -> io::Result<Objec
         }
         let about = match entry.metadata() {
             Ok(about) => about,
-            // Its owner has just removed it.
+            // The owner of the object has just removed it.
             Err(error) if error.kind() == io::ErrorKind::NotFound => continue,
             Err(error) => return Err(error),
         };
@@ -124,7 +124,7 @@ pub(crate) fn reserve(domain: &Domain) -> Result<(), IpcError> {
             OFlags::RDWR | OFlags::CLOEXEC | OFlags::NOFOLLOW,
             Mode::empty(),
         ) else {
-            // Its creator has just removed it, or is still creating it and will preallocate it itself.
+            // The creator of the object has just removed it, or is still creating it and will preallocate it.
             continue;
         };
         let about = rustix::fs::fstat(&file).map_err(|error| unreadable(&error.into()))?;
@@ -166,7 +166,7 @@ mod tests {
         let found = partition_by_owner(folder.path(), "mine_", me).expect("read");
         assert_eq!(found.owned, [path("mine_1")]);
         assert_eq!(found.owned_by_others.len(), 2);
-        // For another user all three belong to others.
+        // Seen from another user, all three objects belong to others.
         let found = partition_by_owner(folder.path(), "mine_", me + 1).expect("read");
         assert_eq!((found.owned.len(), found.owned_by_others.len()), (0, 3));
         assert!(found.owned_by_others.contains(&(path("mine_1"), me)));

@@ -62,7 +62,7 @@ impl WakeSender {
 
     /// Wakes the receiver and gives the reason. A missing receiver and a full receive buffer are ignored.
     pub fn notify(&self, why: WakeReason) {
-        // If the receiver was replaced, the second attempt reconnects.
+        // If another process has replaced the receiver, the second attempt reconnects.
         for _ in 0..2 {
             if !self.connected.get() && self.socket.connect(&self.path).is_err() {
                 return;
@@ -94,7 +94,7 @@ impl WakeReceiver {
             cause: format!("{}: {error}", path.display()),
             remedy: "set XDG_RUNTIME_DIR to a folder with a short path that can be written",
         };
-        // A receiver that was killed left its socket file.
+        // A receiver that was killed leaves its socket file.
         match fs::remove_file(&path) {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(unusable(error)),
             _ => {}
@@ -109,7 +109,7 @@ impl WakeReceiver {
         })
     }
 
-    /// Discards pending wake-ups; the caller has already handled them.
+    /// Discards pending wake-ups whose messages the caller has already handled.
     pub fn discard_wakeups(&self) -> Result<(), IpcError> {
         while self.try_receive()? {}
         Ok(())
@@ -138,7 +138,7 @@ impl WakeReceiver {
         }
     }
 
-    /// Waits for a wake-up, a signal, or `timeout`; returns whether a wake-up came.
+    /// Waits for a wake-up, a signal, or `timeout`; returns whether a wake-up arrived.
     pub fn wait(&self, timeout: Duration) -> Result<bool, IpcError> {
         let timeout = Timespec::try_from(timeout).unwrap_or(Timespec {
             tv_sec: i64::MAX,

@@ -1,9 +1,9 @@
 //! Identity of a service's writer: a random id that the holder of the writer lock generates and stores in the lock
 //! file.
 //!
-//! iceoryx2 is configured with spare writer slots, so that a writer killed while it joins blocks nobody; the lock alone
-//! therefore does not keep others from writing. Each message carries its writer's id, and readers accept only the id of
-//! the lock holder. Only the owner can read the file, as with the folder.
+//! iceoryx2 is configured with spare writer slots, so that a writer killed while it joins does not block the next one. The
+//! lock alone therefore does not keep other processes from writing. Each message carries its writer's id, and readers accept only the id of
+//! the lock holder. Only the owner of the folder can read the file.
 
 use crate::domain::Domain;
 use crate::error::IpcError;
@@ -41,13 +41,13 @@ impl WriterLock {
         taken().map_err(|error| failed(service, &error))
     }
 
-    /// Writer id in all its messages.
+    /// Id that all messages of this writer contain.
     pub fn writer_id(&self) -> u64 {
         self.writer_id
     }
 }
 
-/// A unique id: 63 random bits, never zero.
+/// Creates a unique id: 63 random bits, never zero.
 pub(crate) fn random_id() -> io::Result<u64> {
     let mut bytes = [0; 8];
     getrandom(&mut bytes, GetRandomFlags::empty())?;
@@ -63,7 +63,7 @@ pub(crate) struct WriterFilter {
 }
 
 impl WriterFilter {
-    /// Opens the lock file of a service; the writer need not have joined yet.
+    /// Opens the lock file of a service; the writer may join later.
     pub fn of(domain: &Domain, service: &str) -> Result<WriterFilter, IpcError> {
         let file: io::Result<OwnedFd> = membership::lock_file(domain, service);
         Ok(WriterFilter {
@@ -73,8 +73,8 @@ impl WriterFilter {
         })
     }
 
-    /// Returns whether the id is that of the lock holder; counts the messages that are not. Reads the file only when
-    /// the id changes; allocates nothing.
+    /// Returns whether the id is the id of the lock holder, and counts messages with another id. Reads the file only when the
+    /// id changes; allocates no memory.
     pub fn accepts(&self, writer_id: u64) -> bool {
         if writer_id == 0
             || (writer_id != self.writer_id.get() && !self.matches_lock_holder(writer_id))

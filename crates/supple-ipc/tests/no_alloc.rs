@@ -1,4 +1,4 @@
-//! Publishing and receiving allocate nothing, on the real services.
+//! Tests that publishing and receiving on the shared-memory services allocate no memory.
 
 #[path = "../../../tests/support/counting.rs"]
 mod counting;
@@ -11,7 +11,7 @@ use supple_ipc::message::*;
 use supple_ipc::*;
 
 #[test]
-fn allocation_counter_counts() {
+fn the_allocation_counter_counts_an_allocation() {
     assert_eq!(
         count_allocations(|| drop(std::hint::black_box(Box::new(1)))),
         2
@@ -53,13 +53,13 @@ fn a_thousand_cycles_allocate_nothing() {
         let sequence = operator
             .send::<4>(&Request::GravityHold, None)
             .expect("sent")
-            .expect("there is a controller");
+            .expect("a controller is connected");
         let request = server.request().expect("read").expect("a request");
         let reply = OperatorReply::new(&request, k, Mode::Idle, Outcome::Accepted, Text::EMPTY);
         server.reply(&reply).expect("replied");
         let reply = operator.receive().expect("read").expect("a reply");
         assert_eq!(reply.sequence, sequence);
-        // Waits without a message as well, polling and blocking.
+        // Waits without a message are included, polling and blocking.
         assert!(controller.wait(Duration::ZERO).expect("read").is_none());
         if k.is_multiple_of(100) {
             let moment = Duration::from_micros(200);
@@ -67,7 +67,7 @@ fn a_thousand_cycles_allocate_nothing() {
             assert!(plant.answer(k, moment).expect("read").answer.is_none());
         }
     };
-    // Both sides connect in the first cycles.
+    // The first cycles connect both sides and are not counted.
     (0..4).for_each(&mut cycle);
     assert_eq!(count_allocations(|| (4..1004).for_each(&mut cycle)), 0);
 }

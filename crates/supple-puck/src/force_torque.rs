@@ -32,7 +32,7 @@ impl Quantity {
         }
     }
 
-    /// Destination group of its frames.
+    /// Group to which the sensor sends frames of this quantity.
     pub const fn group(self) -> GroupId {
         match self {
             Quantity::Force => GroupId::FORCE,
@@ -41,11 +41,11 @@ impl Quantity {
         }
     }
 
-    /// Converts three components \[N, N m or m/s^2\] to counts, each rounded to the nearest with halves away from zero,
-    /// and saturated at the range of 16 bits: 128 N, 8 N m or 32 m/s^2.
+    /// Converts three components \[N, N m or m/s^2\] to counts. Each count is rounded to the nearest integer, halves away from
+    /// zero, and saturated at the range of 16 bits: 128 N, 8 N m or 32 m/s^2.
     ///
     /// # Errors
-    /// A component that is not finite.
+    /// [`NotFinite`] for a component that is not finite.
     pub fn counts(self, components: [f64; 3]) -> Result<[i16; 3], NotFinite> {
         if let Some(axis) = components.iter().position(|value| !value.is_finite()) {
             let value = components[axis];
@@ -56,7 +56,7 @@ impl Quantity {
     }
 }
 
-/// A component that is not finite.
+/// Error: a component is not finite.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NotFinite {
     /// Axis, 0 to 2.
@@ -74,12 +74,13 @@ impl fmt::Display for NotFinite {
 
 impl core::error::Error for NotFinite {}
 
-/// Status, the seventh byte, documented for torque frames: which axes have saturated, and whether the data are bad.
+/// Status byte of the sensor: which axes have saturated, and whether the data are bad. It is the seventh byte of a frame,
+/// documented for torque frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SensorStatus(pub u8);
 
 impl SensorStatus {
-    /// Sent while taring.
+    /// Status that the sensor sends while it is taring.
     pub const TARING: SensorStatus = SensorStatus(0x7f);
 
     /// Whether the data of this frame are bad: an axis is saturated, or the sensor is taring.
@@ -115,10 +116,10 @@ impl SensorReading {
         self.counts.map(|counts| f64::from(counts) / scale)
     }
 
-    /// Parses a frame of `quantity`, which its group determines; sender and group are not checked.
+    /// Parses a frame of `quantity`, which the caller knows from the frame's group. Does not check sender and group.
     ///
     /// # Errors
-    /// A payload of neither six nor seven bytes.
+    /// [`LengthError`] if the payload has neither six nor seven bytes.
     pub fn parse(quantity: Quantity, frame: &CanFrame) -> Result<SensorReading, LengthError> {
         let (bytes, status) = match *frame.payload() {
             [a, b, c, d, e, f] => ([a, b, c, d, e, f], None),
@@ -134,7 +135,7 @@ impl SensorReading {
         })
     }
 
-    /// The frame that node `from` sends.
+    /// Encodes the frame that node `from` sends.
     pub fn emit(&self, from: NodeId) -> CanFrame {
         let id = MessageId::to_group(from, self.quantity.group());
         let [[a, b], [c, d], [e, f]] = self.counts.map(i16::to_le_bytes);
@@ -165,7 +166,7 @@ pub fn request_acceleration() -> CanFrame {
     property::get(NodeId::FORCE_TORQUE, ACCELERATION)
 }
 
-/// Tares the sensor; send it before the readings are used.
+/// Encodes the frame that tares the sensor; send it before the readings are used.
 pub fn tare() -> CanFrame {
     property::set(NodeId::FORCE_TORQUE, FORCE_AND_TORQUE, Value::Wide(0))
 }

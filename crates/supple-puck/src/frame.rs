@@ -3,7 +3,7 @@
 use core::fmt;
 use supple_can_frame::CanFrame;
 
-/// A payload of a wrong length for this kind of frame.
+/// Error: the payload length is not valid for this kind of frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LengthError {
     /// Bytes found.

@@ -1,4 +1,4 @@
-//! Message ids: `G FFFFF TTTTT`, the group bit, the sender's node and the receiver's node or group.
+//! Message ids: `G FFFFF TTTTT`, which are the group bit, the sender's node, and the receiver's node or group.
 //!
 //! Every 11-bit number is a valid id, so only numbers above 0x7FF are rejected. Source: manual page 46
 //! and libbarrett's masks; libbarrett for the meaning of the groups.
@@ -10,14 +10,14 @@ const GROUP_BIT: u16 = 0x400;
 const FROM_SHIFT: u16 = 5;
 const FIVE_BITS: u16 = 0x1f;
 
-/// A number that does not fit its field of the id.
+/// Error: a number does not fit into its field of the id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum IdError {
-    /// A node number above 31.
+    /// The node number is above 31.
     Node(u8),
-    /// A group number above 31.
+    /// The group number is above 31.
     Group(u8),
-    /// A message id above 0x7FF.
+    /// The message id is above 0x7FF.
     Message(u32),
 }
 
@@ -45,10 +45,10 @@ impl NodeId {
     /// Safety module.
     pub const SAFETY: NodeId = NodeId(10);
 
-    /// Node `number`.
+    /// Creates the id of node `number`.
     ///
     /// # Errors
-    /// A number above 31.
+    /// [`IdError::Node`] for a number above 31.
     pub const fn new(number: u8) -> Result<NodeId, IdError> {
         if number < 32 {
             Ok(NodeId(number))
@@ -92,7 +92,7 @@ impl GroupId {
     pub const LOWER_TORQUES: GroupId = GroupId(1);
     /// Motor pucks 5 to 7, which receive packed torques.
     pub const UPPER_TORQUES: GroupId = GroupId(2);
-    /// Destination of the motor pucks' positions, which the safety module receives as well.
+    /// Destination of the motor pucks' position replies, which the safety module also receives.
     pub const POSITION: GroupId = GroupId(3);
     /// Motor pucks 1 to 7 (libbarrett, OWD). In the 2008 manual: 1 to 4.
     pub const ARM: GroupId = GroupId(4);
@@ -113,10 +113,10 @@ impl GroupId {
     /// Accelerations of the force/torque sensor.
     pub const ACCELERATION: GroupId = GroupId(12);
 
-    /// Group `number`.
+    /// Creates the id of group `number`.
     ///
     /// # Errors
-    /// A number above 31.
+    /// [`IdError::Group`] for a number above 31.
     pub const fn new(number: u8) -> Result<GroupId, IdError> {
         if number < 32 {
             Ok(GroupId(number))
@@ -175,10 +175,10 @@ impl MessageId {
         }
     }
 
-    /// The id as it is on the bus.
+    /// Creates the id from its number on the bus.
     ///
     /// # Errors
-    /// A number above 0x7FF.
+    /// [`IdError::Message`] for a number above 0x7FF.
     pub const fn from_raw(raw: u32) -> Result<MessageId, IdError> {
         if raw <= 0x7ff {
             Ok(MessageId(raw as u16))
@@ -187,7 +187,7 @@ impl MessageId {
         }
     }
 
-    /// Id of a frame; `None` for a frame that is not of this protocol: one with an extended id, or an FD frame.
+    /// Returns the id of a frame; `None` for a frame with an extended id and for an FD frame, which this protocol does not use.
     pub const fn of(frame: &CanFrame) -> Option<MessageId> {
         match frame.id().as_standard() {
             Some(raw) if !frame.is_fd() => Some(MessageId(raw)),

@@ -1,4 +1,4 @@
-//! Frames that the host receives, distinguished by destination group.
+//! Parses the frames that the host receives, which are distinguished by destination group.
 
 use crate::force_torque::{Quantity, SensorReading};
 use crate::frame::LengthError;
@@ -60,7 +60,7 @@ impl fmt::Display for InboundError {
 impl core::error::Error for InboundError {}
 
 impl Inbound {
-    /// Parses a frame; returns the sender and the contents. Replies may arrive in any order: match them by node.
+    /// Parses a frame; returns the sender and the contents. Replies may arrive in any order; match them by sender.
     ///
     /// # Errors
     /// See [`InboundError`].

@@ -1,8 +1,8 @@
-//! Codec of Barrett's puck protocol, between CAN frames and typed values.
+//! Codec of Barrett's puck protocol: converts between CAN frames and typed values.
 //!
-//! Pure conversions: this crate opens no socket, reads no clock, allocates nothing and keeps no state; the
-//! polling sequence is defined elsewhere. Parsing a frame may fail, and the error names the value found and the
-//! one expected; encoding cannot fail, because the types hold only encodable values.
+//! This crate opens no socket, reads no clock, allocates no memory and keeps no state; `supple-can` defines the polling
+//! sequence. Parsing a frame may fail, and the error contains the found and the expected value; encoding cannot fail,
+//! because the types hold only encodable values.
 //!
 //! The bus is classical CAN 2.0A with 11-bit ids at 1 Mbit/s; other frames are not parsed. The facts come from Barrett's libbarrett (2018)
 //! and btclient (2013), OWD (2015) and the WAM Arm User's Manual D1001 (2008); each module names its sources.

@@ -15,12 +15,12 @@ use supple_can_frame::CanFrame;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Counts(i32);
 
-/// A position outside the range of 22 bits.
+/// Error: a position is outside the range of 22 bits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CountsError {
-    /// Counts outside the range.
+    /// This number of counts is outside the range.
     OutOfRange(i32),
-    /// An angle that is not finite, or outside the range in counts; the counts.
+    /// An angle is not finite or outside the range; the value is the angle in counts.
     Angle(f64),
 }
 
@@ -42,10 +42,10 @@ impl Counts {
     /// Maximum position.
     pub const MAX: Counts = Counts((1 << 21) - 1);
 
-    /// A position in range.
+    /// Creates a position from its counts.
     ///
     /// # Errors
-    /// Counts outside the range of 22 bits.
+    /// [`CountsError::OutOfRange`] for counts outside the range of 22 bits.
     pub const fn new(counts: i32) -> Result<Counts, CountsError> {
         if counts >= Counts::MIN.0 && counts <= Counts::MAX.0 {
             Ok(Counts(counts))
@@ -93,11 +93,11 @@ impl fmt::Display for PositionScaleError {
 impl core::error::Error for PositionScaleError {}
 
 impl PositionScale {
-    /// From the value of [`Property::CTS`](crate::Property::CTS): 4096 for the magnetic encoder,
+    /// Creates the scale from the value of [`Property::CTS`](crate::Property::CTS): 4096 for the magnetic encoder,
     /// 40960 for the optical one.
     ///
     /// # Errors
-    /// A number that is not positive.
+    /// [`PositionScaleError`] for a number that is not positive.
     pub fn new(counts_per_revolution: i32) -> Result<PositionScale, PositionScaleError> {
         if counts_per_revolution > 0 {
             Ok(PositionScale {
@@ -108,15 +108,15 @@ impl PositionScale {
         }
     }
 
-    /// Angle of the encoder \[rad\].
+    /// Converts counts to the angle of the encoder \[rad\].
     pub fn rad(&self, counts: Counts) -> f64 {
         f64::from(counts.0) / self.counts_per_rad
     }
 
-    /// The nearest count to an angle of the encoder \[rad\], rounded half away from zero.
+    /// Converts an angle of the encoder \[rad\] to the nearest count, halves away from zero.
     ///
     /// # Errors
-    /// An angle that is not finite, or outside the range of 22 bits.
+    /// [`CountsError::Angle`] for an angle that is not finite or outside the range of 22 bits.
     pub fn counts(&self, angle_rad: f64) -> Result<Counts, CountsError> {
         let counts = libm::round(angle_rad * self.counts_per_rad);
         let (lower, upper) = (f64::from(Counts::MIN.0), f64::from(Counts::MAX.0));
@@ -133,15 +133,15 @@ impl PositionScale {
 pub struct PositionReply {
     /// Motor encoder.
     pub motor: Counts,
-    /// Joint encoder of the pucks that have one. Not absolute before its index has been found.
+    /// Joint encoder, if the puck has one. Its position is not absolute until the encoder has passed its index.
     pub joint: Option<Counts>,
 }
 
 impl PositionReply {
-    /// Parses a frame to [`GroupId::POSITION`]; the destination is not checked.
+    /// Parses a frame to [`GroupId::POSITION`]. Does not check the destination.
     ///
     /// # Errors
-    /// A payload of neither three nor six bytes.
+    /// [`LengthError`] if the payload has neither three nor six bytes.
     pub fn parse(frame: &CanFrame) -> Result<PositionReply, LengthError> {
         match *frame.payload() {
             [a, b, c] => Ok(PositionReply {
@@ -156,7 +156,7 @@ impl PositionReply {
         }
     }
 
-    /// The frame that node `from` sends.
+    /// Encodes the frame that node `from` sends.
     pub const fn emit(&self, from: NodeId) -> CanFrame {
         let id = MessageId::to_group(from, GroupId::POSITION);
         let [a, b, c] = self.motor.emit();

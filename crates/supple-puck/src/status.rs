@@ -4,7 +4,7 @@
 use crate::property::PuckKind;
 use core::fmt;
 
-/// A value outside the allowed set of an enumerated property.
+/// Error: the value of an enumerated property is not allowed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnknownValue {
     /// Property.
@@ -33,17 +33,17 @@ impl core::error::Error for UnknownValue {}
 pub enum Stat {
     /// Only the monitor (boot program) runs; the puck waits for a wake-up. Writing this value restarts the puck.
     Reset = 0,
-    /// An error.
+    /// The puck has an error.
     Error = 1,
     /// The firmware runs. Writing this value wakes the puck.
     Ready = 2,
 }
 
 impl Stat {
-    /// From the property's value.
+    /// Converts the property's value.
     ///
     /// # Errors
-    /// Not 0, 1 or 2.
+    /// [`UnknownValue`] for a value other than 0, 1 or 2.
     pub const fn from_value(value: i32) -> Result<Stat, UnknownValue> {
         match value {
             0 => Ok(Stat::Reset),
@@ -63,11 +63,11 @@ impl Stat {
     }
 }
 
-/// [`Property::MODE`](crate::Property::MODE) of a motor puck. The host sets `Idle`; torque mode is
-/// set by the safety module when the operator activates the arm.
+/// [`Property::MODE`](crate::Property::MODE) of a motor puck. The host sets `Idle`; the
+/// safety module sets torque mode when the operator activates the arm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MotorMode {
-    /// Windings shorted: the motor brakes, torque commands are ignored, the encoder still works.
+    /// The windings are shorted: the motor brakes and ignores torque commands; the encoder still works.
     Idle = 0,
     /// Control of the duty cycle.
     Duty = 1,
@@ -82,10 +82,10 @@ pub enum MotorMode {
 }
 
 impl MotorMode {
-    /// From the property's value.
+    /// Converts the property's value.
     ///
     /// # Errors
-    /// Not 0 to 5.
+    /// [`UnknownValue`] for a value other than 0 to 5.
     pub const fn from_value(value: i32) -> Result<MotorMode, UnknownValue> {
         match value {
             0 => Ok(MotorMode::Idle),
@@ -142,7 +142,7 @@ impl Role {
     /// Force/torque sensor.
     pub const FORCE: Role = Role(0x0006);
 
-    /// From the property's value, whose sign is ignored.
+    /// Converts the property's value, whose sign is ignored.
     pub const fn from_value(value: i32) -> Role {
         Role(value as u16)
     }
@@ -150,7 +150,7 @@ impl Role {
     /// Type.
     ///
     /// # Errors
-    /// A type above 6.
+    /// [`UnknownValue`] for a type above 6.
     pub const fn role_type(self) -> Result<RoleType, UnknownValue> {
         match self.0 & Role::TYPE_MASK {
             0 => Ok(RoleType::Tater),
@@ -168,8 +168,8 @@ impl Role {
         }
     }
 
-    /// Which property lists the puck uses; `None` if they are unknown. libbarrett uses the motor's lists for taters,
-    /// wraptors and hands.
+    /// Returns the family of property lists that the puck uses; `None` if it is unknown. libbarrett uses the motor's lists for
+    /// taters, wraptors and hands.
     pub const fn kind(self) -> Option<PuckKind> {
         match self.role_type() {
             Ok(RoleType::Tater | RoleType::Wraptor | RoleType::BarrettHand) => {
@@ -190,7 +190,7 @@ impl Role {
         self.has(0x0040)
     }
 
-    /// Processor at 20 MHz; else 32 MHz.
+    /// Whether the processor runs at 20 MHz instead of 32 MHz.
     pub const fn clock_20_mhz(self) -> bool {
         self.has(0x0080)
     }

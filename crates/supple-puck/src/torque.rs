@@ -1,8 +1,8 @@
-//! Packed torques: four 14-bit two's complement values after the property byte, most significant bit first. Each
-//! puck uses the slot of its [`Property::PIDX`](crate::Property::PIDX).
+//! Packed torques: four 14-bit two's complement values after the property byte, most significant bit first. Each puck
+//! reads the slot given by its [`Property::PIDX`](crate::Property::PIDX).
 //!
-//! Torques are rounded to the nearest unit with halves away from zero: the rounding is odd, so that it has no
-//! bias. (libbarrett rounds down, a bias of half a unit.) They saturate at +-8191 units, as in libbarrett.
+//! Torques are rounded to the nearest unit, halves away from zero, so that the rounding has no bias. (libbarrett rounds
+//! down, which is a bias of half a unit.) Torques saturate at +-8191 units, as in libbarrett.
 //! Source: libbarrett, manual.
 
 use crate::frame::LengthError;
@@ -18,12 +18,12 @@ pub struct PuckTorque(i16);
 impl PuckTorque {
     /// Zero torque.
     pub const ZERO: PuckTorque = PuckTorque(0);
-    /// Maximum that a host commands.
+    /// Maximum torque that a host commands.
     pub const MAX: PuckTorque = PuckTorque(8191);
-    /// Minimum that a host commands.
+    /// Minimum torque that a host commands.
     pub const MIN: PuckTorque = PuckTorque(-8191);
 
-    /// The nearest torque within +-8191 units.
+    /// Returns the nearest torque within +-8191 units.
     pub const fn saturating(units: i32) -> PuckTorque {
         if units > PuckTorque::MAX.0 as i32 {
             PuckTorque::MAX
@@ -57,9 +57,9 @@ pub struct TorqueScale {
 /// Errors of the conversion to puck units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TorqueError {
-    /// A scale that is not finite and positive \[1/(N m)\].
+    /// The scale is not finite and positive \[1/(N m)\].
     Scale(f64),
-    /// A torque that is not finite \[N m\].
+    /// The torque is not finite \[N m\].
     Torque(f64),
 }
 
@@ -80,11 +80,11 @@ impl fmt::Display for TorqueError {
 impl core::error::Error for TorqueError {}
 
 impl TorqueScale {
-    /// From the value of [`Property::IPNM`](crate::Property::IPNM) or an identified one. Barrett's are
-    /// 2700 for motors 1 to 4, 6500 for 5 and 6, 17474 for 7.
+    /// Creates the scale from the value of [`Property::IPNM`](crate::Property::IPNM), or from an identified value. Barrett's
+    /// values are 2700 for motors 1 to 4, 6500 for 5 and 6, 17474 for 7.
     ///
     /// # Errors
-    /// A scale that is not finite and positive.
+    /// [`TorqueError::Scale`] for a scale that is not finite and positive.
     pub const fn new(units_per_nm: f64) -> Result<TorqueScale, TorqueError> {
         if units_per_nm.is_finite() && units_per_nm > 0.0 {
             Ok(TorqueScale { units_per_nm })
@@ -98,13 +98,13 @@ impl TorqueScale {
         self.units_per_nm
     }
 
-    /// Nearest torque of the motor to `torque_nm`, rounded half away from zero, within +-8191 units.
+    /// Converts `torque_nm` to the nearest torque in puck units, halves away from zero, within +-8191 units.
     ///
     /// # Errors
-    /// A torque that is not finite, which saturation would turn into a limit.
+    /// [`TorqueError::Torque`] for a torque that is not finite, which would otherwise saturate at a limit.
     pub fn puck_torque(&self, torque_nm: f64) -> Result<PuckTorque, TorqueError> {
         if torque_nm.is_finite() {
-            // A float outside the integer range saturates in the cast, then again here.
+            // A float outside the integer range saturates in the cast, and the integer saturates here.
             let units = libm::round(torque_nm * self.units_per_nm) as i32;
             Ok(PuckTorque::saturating(units))
         } else {
@@ -130,7 +130,7 @@ pub struct PackedTorques {
 /// Errors of parsing a packed torque frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PackedTorquesError {
-    /// Not eight bytes.
+    /// The payload does not have eight bytes.
     Length(LengthError),
     /// The first byte lacks the set bit.
     NotASet(u8),
@@ -157,11 +157,10 @@ impl PackedTorques {
         self.slots.get(index).copied()
     }
 
-    /// Parses a frame to [`GroupId::LOWER_TORQUES`] or [`GroupId::UPPER_TORQUES`]; the destination is not
-    /// checked.
+    /// Parses a frame to [`GroupId::LOWER_TORQUES`] or [`GroupId::UPPER_TORQUES`]. Does not check the destination.
     ///
     /// # Errors
-    /// A payload that is not eight bytes, or starts with a request byte.
+    /// [`PackedTorquesError`] for a payload that does not have eight bytes, or begins with a request byte.
     pub fn parse(frame: &CanFrame) -> Result<PackedTorques, PackedTorquesError> {
         let Ok([head, rest @ ..]) = <[u8; 8]>::try_from(frame.payload()) else {
             return Err(PackedTorquesError::Length(LengthError::of(frame, &[8])));
@@ -177,7 +176,7 @@ impl PackedTorques {
         })
     }
 
-    /// The frame that the host sends to `group`.
+    /// Encodes the frame that the host sends to `group`.
     pub fn emit(&self, group: GroupId) -> CanFrame {
         let bits = self
             .slots

@@ -10,9 +10,9 @@ use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::thread::Builder;
 use std::time::Instant;
 
-/// Stack of the thread \[bytes\]: under locked memory all of it is resident.
+/// Stack size of the thread \[bytes\]; with locked memory the whole stack is resident.
 const STACK_BYTES: usize = 256 * 1024;
-/// Interval at which [`BackgroundWriter::flush`] retries on a full queue.
+/// Interval at which [`BackgroundWriter::flush`] retries if the queue is full.
 const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
 type Job = Box<dyn FnOnce() + Send>;
@@ -48,7 +48,7 @@ impl BackgroundWriter {
         })
     }
 
-    /// Queues a job; returns false if it was dropped because the queue is full or the thread has ended.
+    /// Queues a job; returns false if the job was dropped because the queue is full or the thread has ended.
     pub fn submit(&self, job: impl FnOnce() + Send + 'static) -> bool {
         let accepted = self.sender.try_send(Box::new(job)).is_ok();
         if !accepted {
@@ -62,7 +62,7 @@ impl BackgroundWriter {
         self.dropped.load(Ordering::Relaxed)
     }
 
-    /// Waits for at most `timeout` until all jobs queued before are done; returns whether they are.
+    /// Waits for at most `timeout` until all jobs queued so far are done; returns whether they are done.
     pub fn flush(&self, timeout: Duration) -> bool {
         let start = Instant::now();
         let (sender, done) = sync_channel(1);
@@ -89,13 +89,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn blocked_job_does_not_block_submit_and_dropped_jobs_are_counted() {
+    fn submit_does_not_block_and_counts_dropped_jobs() {
         let writer = BackgroundWriter::start("test", 2).expect("a thread");
         let (open, gate) = sync_channel::<()>(0);
         let (begun, has_begun) = sync_channel(1);
         assert!(writer.submit(move || {
-            begun.send(()).expect("the test waits");
-            gate.recv().expect("the test opens");
+            begun.send(()).expect("the test receives");
+            gate.recv().expect("the test sends");
         }));
         has_begun.recv().expect("it begins");
         let done = Arc::new(AtomicU64::new(0));
@@ -108,8 +108,11 @@ mod tests {
             })
             .count();
         assert_eq!((accepted, writer.dropped()), (2, 8));
-        assert!(!writer.flush(Duration::from_millis(2)), "it is blocked");
-        open.send(()).expect("the job waits");
+        assert!(
+            !writer.flush(Duration::from_millis(2)),
+            "the job is blocked"
+        );
+        open.send(()).expect("the job receives");
         assert!(writer.flush(Duration::from_secs(60)));
         assert_eq!(done.load(Ordering::Relaxed), 2);
     }
@@ -117,12 +120,12 @@ mod tests {
     #[test]
     fn flush_fails_when_the_thread_has_died() {
         let writer = BackgroundWriter::start("test", 1).expect("a thread");
-        // Its panic drops the queue.
+        // The panic of the job drops the queue.
         writer.submit(|| std::panic::resume_unwind(Box::new(())));
         while writer.submit(|| {}) {
             std::thread::yield_now();
         }
-        // The queue may be full at first; in the end the thread is gone.
+        // The queue may be full at first; once the thread has ended, flush fails.
         assert!(!writer.flush(Duration::from_secs(60)));
     }
 }

@@ -1,7 +1,7 @@
-//! Lines for standard error, which may be closed, full, or a paused terminal.
+//! Writes lines to standard error, which may be closed, full, or a paused terminal.
 //!
-//! A process that controls an arm must not block on the reader of its standard error, nor end if there is none: a
-//! background thread writes the lines. If the queue is full, messages are dropped; the next one that is accepted reports
+//! A process that controls an arm must not block if its standard error is not read, nor end if it is closed: a background
+//! thread writes the lines. If the queue is full, messages are dropped; the next one that is accepted reports
 //! how many.
 
 use crate::background::BackgroundWriter;
@@ -13,11 +13,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Queue length, in lines.
 const CAPACITY: usize = 256;
-/// Maximum time that a process waits for its last lines at its end.
+/// Maximum time for which a process waits at its end until its last lines are written.
 const FLUSH_TIMEOUT: Duration = Duration::from_millis(300);
 
 static WRITER: OnceLock<Option<BackgroundWriter>> = OnceLock::new();
-/// Messages dropped since the last one that was accepted.
+/// Number of messages dropped since the last accepted message.
 static DROPPED: AtomicU64 = AtomicU64::new(0);
 
 /// Starts the writer thread and redirects panic messages to it. Call it at the start of a program, before realtime
@@ -30,19 +30,19 @@ pub fn start() {
                 "thread {}: {panic}",
                 thread.name().unwrap_or("without a name")
             ));
-            // The process may end without another word.
+            // The process may end after this message.
             flush();
         }));
     }
 }
 
-/// Queues a line, given without its line end; after [`start`] it never blocks. It allocates, so threads that must not allocate cannot use
-/// it.
+/// Queues a line, given without its line end. After [`start`] this never blocks. It allocates memory: threads that may not
+/// allocate must not call it.
 pub fn post(line: impl Display) {
     post_part(format!("{line}\n"));
 }
 
-/// As [`post`], for text without a line end, such as a progress line that is overwritten.
+/// Queues text without a line end, such as a progress line that is overwritten; otherwise as [`post`].
 pub fn post_part(text: String) {
     let dropped = DROPPED.swap(0, Ordering::Relaxed);
     let accepted = writer()
@@ -52,8 +52,8 @@ pub fn post_part(text: String) {
     }
 }
 
-/// Waits briefly until the queued lines are written; call it last in a program. Returns false if they could not be
-/// written in time, or there is no thread that writes them.
+/// Waits briefly until the queued lines are written; call it last in a program. Returns false if they were
+/// not written in time, or if [`start`] was not called.
 pub fn flush() -> bool {
     writer().is_some_and(|writer| writer.flush(FLUSH_TIMEOUT))
 }
@@ -63,8 +63,8 @@ fn writer() -> Option<&'static BackgroundWriter> {
     WRITER.get_or_init(start).as_ref()
 }
 
-/// One write per line, so that lines of several processes do not interleave. Errors are ignored: there is nowhere to
-/// report them.
+/// Writes a line with one call, so that lines of several processes do not interleave. Ignores errors, because they cannot
+/// be reported.
 fn write(out: &mut impl Write, text: &str, dropped: u64) {
     let text = match dropped {
         0 => text.to_owned(),
@@ -90,7 +90,7 @@ mod tests {
     }
 
     #[test]
-    fn closed_reader_is_no_error() {
+    fn write_ignores_a_closed_standard_error() {
         struct Closed;
         impl Write for Closed {
             fn write(&mut self, _: &[u8]) -> std::io::Result<usize> {

@@ -1,8 +1,8 @@
-//! Watchdog messages to the service manager, sent while all monitored threads make progress.
+//! Sends watchdog messages to the service manager while all monitored threads make progress.
 //!
 //! Each periodic thread increments its [`LivenessCounter`] once per iteration. The [`Heartbeat`] thread compares the
 //! counts twice per watchdog interval and sends `WATCHDOG=1` only if every count has advanced. If a thread hangs, the
-//! messages stop and the manager kills the process; the plant then reacts as to any lost controller.
+//! messages stop and the manager kills the process; the plant then reacts as to every loss of the controller.
 
 use crate::notify::{Notifier, NotifyError};
 use core::time::Duration;
@@ -19,7 +19,7 @@ const STACK_BYTES: usize = 64 * 1024;
 pub struct LivenessCounter(Arc<AtomicU64>);
 
 impl LivenessCounter {
-    /// Counts one iteration. Neither blocks nor allocates.
+    /// Counts one iteration. Does not block or allocate memory.
     pub fn increment(&self) {
         self.0.fetch_add(1, Ordering::Relaxed);
     }
@@ -30,14 +30,14 @@ impl LivenessCounter {
     }
 }
 
-/// The counters, with their values at the last watchdog message.
+/// Detects whether all threads make progress; holds their counters and the values at the last watchdog message.
 #[derive(Clone, Debug)]
 pub struct LivenessMonitor {
     counters: Vec<(LivenessCounter, u64)>,
 }
 
 impl LivenessMonitor {
-    /// Monitors these counters from their current values.
+    /// Creates the monitor of these counters, starting from their current values.
     pub fn new(counters: &[LivenessCounter]) -> LivenessMonitor {
         let counted = counters
             .iter()
@@ -47,7 +47,7 @@ impl LivenessMonitor {
         }
     }
 
-    /// Whether every thread has advanced since this last returned true.
+    /// Whether every thread has advanced since this function last returned true.
     pub fn all_advanced(&mut self) -> bool {
         let counts: Vec<u64> = self
             .counters
@@ -121,7 +121,7 @@ fn send_watchdog_messages(
 ) {
     while wait(every) {
         if monitor.all_advanced() {
-            // An error is ignored: without a manager, no watchdog can expire.
+            // Errors are ignored: if the manager has ended, no watchdog expires.
             let _ = notifier.alive();
         }
     }
@@ -129,7 +129,7 @@ fn send_watchdog_messages(
 
 impl Drop for Heartbeat {
     fn drop(&mut self) {
-        // Sent first, so that the manager applies its shutdown timeout instead of the watchdog.
+        // `STOPPING=1` is sent first, so that the manager applies its shutdown timeout instead of the watchdog.
         let _ = self.notifier.stopping();
         drop(self.stop.take());
         if let Some(thread) = self.thread.take() {
@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn monitor_requires_progress_of_every_thread() {
+    fn all_advanced_requires_progress_of_every_thread() {
         let (a, b) = (LivenessCounter::default(), LivenessCounter::default());
         let mut monitor = LivenessMonitor::new(&[a.clone(), b.clone()]);
         assert!(!monitor.all_advanced(), "no thread has advanced");
@@ -186,7 +186,7 @@ mod tests {
 
     /// The loop of the heartbeat thread with a simulated wait: the counter advances in three of five intervals.
     #[test]
-    fn hanging_thread_stops_the_watchdog_messages() {
+    fn watchdog_messages_stop_while_a_thread_hangs() {
         let folder = tempfile::tempdir().unwrap();
         let (manager, notifier) = manager(&folder);
         let counter = LivenessCounter::default();

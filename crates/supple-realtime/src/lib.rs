@@ -1,9 +1,9 @@
-//! What a periodic process needs from Linux: locked memory, realtime priority, CPU affinity, clock and sleeps, folders
-//! of its owner alone, shutdown signals, background threads for disk and terminal output, and watchdog messages to the
-//! service manager.
+//! Linux services for periodic processes: locked memory, realtime priority, CPU affinity, clock and sleeps, owner-only
+//! folders, shutdown signals, background threads for disk and terminal output, and watchdog messages to the service
+//! manager.
 //!
-//! Its settings affect timing, never results: what the system refuses is reported as a [`RealtimeWarning`], and the
-//! process continues. This crate depends on no arm and no controller.
+//! Realtime settings affect the timing of a process, never its results. A setting that the system refuses is reported as a
+//! [`RealtimeWarning`], and the process continues. This crate depends on no arm and no controller.
 
 mod background;
 mod clock;
@@ -37,7 +37,7 @@ pub use stop::{Stop, StopError, die_with_parent, ignore_file_size_and_tty_signal
 
 use std::io::Error;
 
-/// A setting that the system refused: the thread runs, but may be late.
+/// Warning: the system refused a realtime setting. The thread runs, but may be late.
 #[derive(Debug, thiserror::Error)]
 pub enum RealtimeWarning {
     /// Memory may be paged out.
@@ -58,7 +58,9 @@ pub enum RealtimeWarning {
         error: Error,
     },
     /// The scheduler may migrate the thread between processors.
-    #[error("not bound to processor {cpu} ({error}): choose one that is there, see nproc")]
+    #[error(
+        "not bound to processor {cpu} ({error}): choose a processor that exists, numbered from 0 to one less than `nproc` prints"
+    )]
     Cpu {
         /// Requested value.
         cpu: usize,

@@ -1,10 +1,10 @@
-//! Locked and prefaulted memory.
+//! Locks and prefaults memory.
 
 use rustix::mm::{MlockAllFlags, mlockall};
 use std::hint::black_box;
 use std::io::Error;
 
-/// Stack size that a control cycle never exceeds; prefaulted once.
+/// Size of the stack that is prefaulted \[bytes\]; a control cycle never uses more.
 const STACK_BYTES: usize = 256 * 1024;
 
 /// Locks all present and future memory, disables heap trimming, and prefaults the stack.

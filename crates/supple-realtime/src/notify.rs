@@ -1,6 +1,6 @@
-//! Messages to the service manager as in `sd_notify(3)`: ready, alive, stopping.
+//! Sends messages to the service manager as `sd_notify(3)` does: ready, alive, stopping.
 //!
-//! Each is one datagram to the Unix socket that the manager names in `NOTIFY_SOCKET`. Sending never blocks: if the
+//! Each message is one datagram to the Unix socket that the manager names in `NOTIFY_SOCKET`. Sending never blocks: if the
 //! manager's queue is full, the message is dropped, and the next watchdog message replaces it.
 
 use core::time::Duration;
@@ -10,10 +10,10 @@ use std::os::linux::net::SocketAddrExt;
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::net::{SocketAddr, UnixDatagram};
 
-/// The service manager cannot be reached.
+/// Error in notifying the service manager.
 #[derive(Debug, thiserror::Error)]
 pub enum NotifyError {
-    /// A socket that cannot be addressed or written to.
+    /// The socket of the manager cannot be addressed or written to.
     #[error(
         "NOTIFY_SOCKET is `{address}`, which cannot be written to ({error}): start the program by its \
          service, or unset NOTIFY_SOCKET"
@@ -29,7 +29,7 @@ pub enum NotifyError {
         "the thread for watchdog messages cannot be started: {0}; raise the user's limit of processes"
     )]
     Thread(Error),
-    /// An invalid watchdog time.
+    /// The watchdog time is invalid.
     #[error(
         "WATCHDOG_USEC is `{value}`, not a positive number of microseconds: correct WatchdogSec of the \
          service"
@@ -55,7 +55,7 @@ pub struct ManagerVariables {
     pub notify_socket: Option<OsString>,
     /// `WATCHDOG_USEC`: time without a watchdog message after which the manager ends the process \[us\].
     pub watchdog_usec: Option<OsString>,
-    /// `WATCHDOG_PID`: process that the watchdog applies to; any if not given.
+    /// `WATCHDOG_PID`: id of the process that the watchdog monitors; every process if not given.
     pub watchdog_pid: Option<OsString>,
 }
 
@@ -110,7 +110,7 @@ impl Notifier {
     /// Sends a watchdog message.
     ///
     /// # Errors
-    /// As [`Notifier::ready`].
+    /// The same as those of [`Notifier::ready`].
     pub fn alive(&self) -> Result<(), NotifyError> {
         self.send("WATCHDOG=1\n")
     }
@@ -118,7 +118,7 @@ impl Notifier {
     /// Reports that the process is about to end.
     ///
     /// # Errors
-    /// As [`Notifier::ready`].
+    /// The same as those of [`Notifier::ready`].
     pub fn stopping(&self) -> Result<(), NotifyError> {
         self.send("STOPPING=1\n")
     }
@@ -181,7 +181,7 @@ mod tests {
     }
 
     #[test]
-    fn path_and_abstract_addresses_work() {
+    fn messages_arrive_at_path_and_abstract_addresses() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("notify");
         let name = format!("supple-notify-{}", std::process::id());
@@ -214,7 +214,7 @@ mod tests {
     }
 
     #[test]
-    fn without_a_manager_there_is_no_notifier() {
+    fn new_returns_no_notifier_without_a_manager() {
         assert!(
             Notifier::new(&ManagerVariables::default())
                 .unwrap()

@@ -1,4 +1,4 @@
-//! Sleeps without `std::thread`.
+//! A sleep that a signal ends early.
 
 use core::time::Duration;
 use rustix::thread::{NanosleepRelativeResult, Timespec, nanosleep};

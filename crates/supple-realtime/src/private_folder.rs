@@ -1,4 +1,4 @@
-//! Folders that only their owner can enter, and where the processes of a user find them.
+//! Owner-only folders, and the path at which the processes of a user find them.
 
 use std::fs::DirBuilder;
 use std::io;
@@ -10,19 +10,20 @@ const OWNER_ONLY: u32 = 0o700;
 /// Permissions of all other users.
 const OTHERS: u32 = 0o077;
 
-/// Why a folder is not private to this user. The message continues one that names the folder.
+/// Reason why a folder is not accessible only to this user. The message is the predicate of a sentence whose subject is the
+/// folder.
 #[derive(Debug, thiserror::Error)]
 pub enum PrivateFolderError {
-    /// It does not exist and cannot be created.
+    /// The folder does not exist and cannot be created.
     #[error("cannot be created: {0}")]
     Create(io::Error),
-    /// Its owner and its permissions cannot be read.
+    /// The owner and the permissions of the folder cannot be read.
     #[error("cannot be read: {0}")]
     Read(io::Error),
-    /// Something else has its name; links are not followed.
+    /// The path is not a folder; symbolic links are not followed.
     #[error("is a link or no folder")]
     NoFolder,
-    /// It belongs to another user.
+    /// The folder belongs to another user.
     #[error("belongs to user {owner}, you are {user}")]
     OtherUser {
         /// Id of the owner.
@@ -30,7 +31,7 @@ pub enum PrivateFolderError {
         /// Id of this user.
         user: u32,
     },
-    /// Other users have permissions.
+    /// Other users have permissions on the folder.
     #[error("has mode {mode:o}, open to others")]
     OpenToOthers {
         /// The permissions.
@@ -38,10 +39,10 @@ pub enum PrivateFolderError {
     },
 }
 
-/// Creates a folder that only its owner can enter, and missing parents alike; one that exists stays as it is.
+/// Creates a folder, and its missing parents, that only the owner can access. An existing folder is not changed.
 ///
 /// # Errors
-/// Of the operating system.
+/// If the operating system refuses to create a folder.
 pub fn create_private_folder(path: &Path) -> io::Result<()> {
     DirBuilder::new()
         .recursive(true)
@@ -49,10 +50,10 @@ pub fn create_private_folder(path: &Path) -> io::Result<()> {
         .create(path)
 }
 
-/// Creates the folder, or checks that it is a folder, that it belongs to this user and is closed to all others.
+/// Creates the folder; if the path exists, checks that it is a folder of this user that no other user can access.
 ///
 /// # Errors
-/// [`PrivateFolderError`].
+/// [`PrivateFolderError`] with the reason.
 pub fn open_private_folder(path: &Path) -> Result<(), PrivateFolderError> {
     create_private_folder(path).map_err(PrivateFolderError::Create)?;
     let found = path.symlink_metadata().map_err(PrivateFolderError::Read)?;
@@ -71,8 +72,8 @@ pub fn open_private_folder(path: &Path) -> Result<(), PrivateFolderError> {
     Ok(())
 }
 
-/// Path for the sockets and locks of this user's processes: `NAME` under `$XDG_RUNTIME_DIR`, or `/tmp/NAME-UID` if the
-/// variable is not set. It may not exist.
+/// Returns the path for the sockets and locks of this user's processes: `NAME` under `$XDG_RUNTIME_DIR`, or `/tmp/NAME-UID` if the
+/// variable is not set. The folder may not exist.
 pub fn runtime_folder(name: &str) -> PathBuf {
     match std::env::var_os("XDG_RUNTIME_DIR") {
         Some(runtime) if !runtime.is_empty() => PathBuf::from(runtime).join(name),
@@ -132,7 +133,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let other = 65_534;
         if std::os::unix::fs::chown(folder.path(), Some(other), None).is_err() {
-            println!("skipped: no folder can be given to another user");
+            println!("skipped: this user may not change the owner of a folder");
             return;
         }
         let error = open_private_folder(folder.path()).expect_err("of another user");

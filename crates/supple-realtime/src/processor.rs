@@ -1,11 +1,11 @@
-//! Whether this processor has the instructions that the programs were built for (`.cargo/config.toml`).
+//! Checks that the processor has the instructions for which the programs were built (`.cargo/config.toml`).
 
 use std::process::ExitCode;
 
-/// Exit code where the processor cannot run the program: the machine does not meet the requirements.
+/// Exit code of a program on a processor that cannot run it: the machine does not meet the requirements.
 const EXIT_CODE: u8 = 8;
 
-/// What x86-64-v3 adds: whether this build uses it, and its flag in `/proc/cpuinfo`.
+/// Instruction sets of x86-64-v3: whether this build uses each, and its flag in `/proc/cpuinfo`.
 const FLAGS: [(bool, &str); 7] = [
     (cfg!(target_feature = "lzcnt"), "abm"),
     (cfg!(target_feature = "avx"), "avx"),
@@ -16,7 +16,7 @@ const FLAGS: [(bool, &str); 7] = [
     (cfg!(target_feature = "movbe"), "movbe"),
 ];
 
-/// The processor lacks instructions that the program uses.
+/// Error: the processor lacks instructions that the program uses.
 #[derive(Debug, PartialEq, thiserror::Error)]
 #[error(
     "this program was built for processors with {missing}, which this one lacks: build it with \
@@ -27,10 +27,10 @@ pub struct ProcessorError {
     missing: String,
 }
 
-/// Checks that the processor can run this program. Call it first: later it would end by an illegal instruction.
+/// Checks that the processor can run this program. Call it first in a program, before an illegal instruction can end it.
 ///
 /// # Errors
-/// [`ProcessorError`]. Where the flags of the processor cannot be read, the check passes.
+/// [`ProcessorError`] with the missing instruction sets. If the flags of the processor cannot be read, the check passes.
 pub fn check_processor() -> Result<(), ProcessorError> {
     match std::fs::read_to_string("/proc/cpuinfo") {
         Ok(text) => check(&FLAGS, &text),
@@ -38,7 +38,7 @@ pub fn check_processor() -> Result<(), ProcessorError> {
     }
 }
 
-/// Runs a program, or, where the processor cannot, prints the error and returns exit code 8.
+/// Runs a program; on a processor that cannot run it, prints the error and returns exit code 8.
 pub fn run_on_supported_processor(program: fn() -> ExitCode) -> ExitCode {
     match check_processor() {
         Ok(()) => program(),
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_build_does_not_use_may_be_missing() {
+    fn instructions_that_the_build_does_not_use_may_be_missing() {
         let needed = FLAGS.map(|(_, flag)| (flag == "avx", flag));
         assert_eq!(check(&needed, OLD), Ok(()));
         assert_eq!(
@@ -94,7 +94,7 @@ mod tests {
     }
 
     #[test]
-    fn these_tests_run_on_a_processor_that_is_good_enough() {
+    fn the_processor_of_this_machine_passes_the_check() {
         assert_eq!(check_processor(), Ok(()));
     }
 }

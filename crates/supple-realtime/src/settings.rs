@@ -12,7 +12,7 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// No settings: virtual time needs none.
+    /// No settings, for virtual time.
     pub const NONE: Settings = Settings {
         priority: None,
         cpu: None,

@@ -1,4 +1,4 @@
-//! How long a thread polls for a message (spins) before it blocks.
+//! Time for which a thread polls for a message (spins) before it blocks.
 
 use core::time::Duration;
 use std::thread::available_parallelism;
@@ -6,9 +6,9 @@ use std::thread::available_parallelism;
 /// Default on several processors: a controller on another processor typically answers within this time.
 const DEFAULT_SPIN_US: u32 = 50;
 
-/// `requested_us` if given; else 50 us if the calling thread may run on several processors, and zero if on one only.
-/// There spinning would keep the other process from answering, unless that process has the higher priority. Call this
-/// after [`crate::apply_realtime_settings`], which may bind the thread to one processor.
+/// Returns `requested_us` if given; otherwise 50 us if the calling thread may run on several processors, and zero if it may
+/// run on only one. On a single processor, spinning would keep the other process from answering, unless that process has
+/// the higher priority. Call this after [`crate::apply_realtime_settings`], which may bind the thread to one processor.
 pub fn spin_duration(requested_us: Option<u32>) -> Duration {
     let several = available_parallelism().is_ok_and(|n| n.get() > 1);
     let default_us = if several { DEFAULT_SPIN_US } else { 0 };

@@ -4,9 +4,9 @@ use rustix::process::{Signal, set_parent_process_death_signal};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The handlers could not be installed.
+/// Error: the signal handlers cannot be installed.
 #[derive(Debug, thiserror::Error)]
-#[error("signals cannot be handled: {0}")]
+#[error("the signal handlers cannot be installed: {0}")]
 pub struct StopError(#[from] ctrlc::Error);
 
 /// Shutdown flag. Clones share the same flag.
@@ -48,6 +48,6 @@ pub fn ignore_file_size_and_tty_signals() {
 
 /// Requests a SIGTERM for this process when its parent process ends for any reason.
 pub fn die_with_parent() {
-    // If this fails, the process outlives a killed parent; the next start then reports a second writer.
+    // If this fails, the process continues after its parent is killed; the next start then reports a second writer.
     let _ = set_parent_process_death_signal(Some(Signal::TERM));
 }

@@ -15,7 +15,7 @@ use supple_plant::PlantOptions;
 /// Runs `supple demo`.
 ///
 /// # Errors
-/// [`Failure`]; [`Failure::Fault`] after all results are written.
+/// [`Failure`]; if a fault ended a run, [`Failure::Fault`] after all results are written.
 pub fn run(args: &DemoArgs) -> Result<(), Failure> {
     let summary = perform(args, None)?;
     if args.json {
@@ -29,7 +29,7 @@ pub fn run(args: &DemoArgs) -> Result<(), Failure> {
 /// Prints the summary as a table.
 ///
 /// # Errors
-/// [`Failure`] of standard output.
+/// [`Failure`] if standard output cannot be written.
 pub fn print(summary: &Summary) -> Result<(), Failure> {
     print_line(&format!("{}\n", table::table(summary)))?;
     let notes = table::arm_notes(summary);
@@ -39,7 +39,7 @@ pub fn print(summary: &Summary) -> Result<(), Failure> {
     }
 }
 
-/// Names the report, and the faults that ended runs early.
+/// Prints the path of the report, and fails if faults ended runs early.
 ///
 /// # Errors
 /// [`Failure::Fault`].
@@ -60,7 +60,7 @@ pub fn finish(args: &DemoArgs, summary: &Summary) -> Result<(), Failure> {
     })
 }
 
-/// Runs the experiments on an arm with these effects of a real one instead of those of `args`, and writes all results.
+/// Runs the experiments on an arm with the effects `plant` instead of those of `args`, and writes all results.
 ///
 /// # Errors
 /// [`Failure`].

@@ -155,7 +155,7 @@ mod tests {
     use supple_model::Description;
 
     #[test]
-    fn a_row_has_the_median_the_worst_the_latches_and_what_failed() {
+    fn a_row_has_median_worst_seed_false_contacts_and_failures() {
         let run = |seed, model, sinusoid_rms_m: f64| EffectRun {
             effect: "none",
             model,

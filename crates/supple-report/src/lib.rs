@@ -1,7 +1,7 @@
 //! The paper's experiments and identification, with figures and HTML reports.
 //!
-//! The program `supple-report` has every command that needs no running system; `supple` starts it for those that draw
-//! figures. It links neither shared memory nor a bus. It is a library only so that tests can reach its parts.
+//! The program `supple-report` has every command that needs no running system; `supple` starts it for the commands
+//! that draw figures. It links neither shared memory nor a bus. It is a library only so that tests can use its modules.
 
 #![forbid(unsafe_code)]
 

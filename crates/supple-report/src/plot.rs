@@ -28,18 +28,18 @@ struct Summary<'a> {
     figures: Vec<PathBuf>,
 }
 
-/// Curves of the torque and the terms whose sum each of them is. All other terms are one more curve, so that the curves add
-/// up to the torque before its limits.
+/// Curves of the torque, each with the terms that it sums. A further curve sums all other terms, so that the curves add up to
+/// the torque before its limits.
 const TERM_CURVES: [(&str, &[&str]); 4] = [
     ("gravity", &["gravity"]),
     ("friction", &["friction"]),
     ("inertia", &["inertial", "jacobian_rate", "coriolis"]),
     ("feedback", &["stiffness", "damping", "joint_pd"]),
 ];
-/// Name of the curve of the other terms.
+/// Name of the curve that sums the other terms.
 const OTHER_TERMS: &str = "other";
 
-/// The sums of [`TERM_CURVES`], and that of the other terms \[N m\].
+/// Computes the sums of [`TERM_CURVES`], and the sum of the other terms \[N m\].
 fn sums_of_terms<const N: usize>(torques: &Torques<N>) -> [Vector<N>; TERM_CURVES.len() + 1] {
     let mut sums = [Vector::zeros(); TERM_CURVES.len() + 1];
     for (name, torque_nm) in torques.named() {
@@ -62,7 +62,7 @@ struct Content {
     force_n: Points,
     contacts_s: Vec<(f64, f64)>,
     faults: Vec<(f64, String)>,
-    /// Of each joint: what is commanded, then each of [`TERM_CURVES`], then all other terms.
+    /// For each joint: commanded torque, then each of [`TERM_CURVES`], then the sum of the other terms.
     torques: Vec<[Points; TERM_CURVES.len() + 2]>,
     step_us: Points,
     period_us: Points,

@@ -1,5 +1,5 @@
-//! Progress of long work on standard error: of the demo a bar on a terminal and a line every 20 % otherwise, of work in
-//! steps a line as each begins.
+//! Reports the progress of long work on standard error. The demo has a bar on a terminal, otherwise a line every 20 %. Work
+//! in steps has a line at the beginning of each step.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::IsTerminal;
@@ -52,7 +52,7 @@ impl ProgressReporter {
             ProgressReporter::Lines(next) => {
                 let mut next = next.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
                 if fraction >= *next - 1e-9 {
-                    // The fraction may be a rounding error below the one that is due.
+                    // The fraction may be below the next line's fraction by a rounding error.
                     *next = (((fraction + 1e-9) / LINE_EVERY).floor() + 1.0) * LINE_EVERY;
                     let Progress {
                         done_s, total_s, ..
@@ -86,7 +86,7 @@ pub struct Steps {
 }
 
 impl Steps {
-    /// Work of `total` steps.
+    /// Creates the progress of work in `total` steps.
     pub fn new(total: usize, quiet: bool) -> Steps {
         Steps {
             total,
@@ -118,7 +118,7 @@ impl Steps {
         self.spinner = Some(spinner);
     }
 
-    /// Ends the running step; its line stays.
+    /// Ends the running step; its line remains visible.
     pub fn finish(&mut self) {
         if let Some(spinner) = self.spinner.take() {
             spinner.finish();

@@ -1,4 +1,4 @@
-//! `report.html`: one self-contained file that needs no network.
+//! Creates `report.html`, one self-contained file that needs no network.
 
 use crate::figures::Figure;
 use crate::sections::{Section, faults, sections};
@@ -19,7 +19,7 @@ struct Report<'a> {
     joints: String,
     seed: u64,
     model: Option<&'a str>,
-    /// Whether most rows are of a plant without the effects of a real arm.
+    /// Whether the plant of most rows lacks the effects of a real arm.
     ideal: bool,
     logs: bool,
     faults: Vec<String>,
@@ -99,7 +99,7 @@ pub fn html(
         .map_err(|error| Failure::ReportGeneration(error.to_string()))
 }
 
-/// One line per fault, with its run.
+/// Describes each fault in one line, with its run.
 pub fn fault_lines(summary: &Summary) -> Vec<String> {
     let lines = faults(summary).into_iter();
     lines
@@ -168,7 +168,7 @@ mod tests {
     use super::scientific;
 
     #[test]
-    fn powers_are_raised() {
+    fn powers_of_ten_have_superscript_exponents() {
         assert_eq!(scientific(1.4e8), "1.4 \u{d7} 10\u{2078}");
         assert_eq!(scientific(2e-13), "2 \u{d7} 10\u{207b}\u{b9}\u{b3}");
     }

@@ -19,8 +19,8 @@ pub fn table(summary: &Summary) -> String {
     table.trim_fmt()
 }
 
-/// One line for each run that the arm cannot perform at the size of its paths, with the reason, and for each fault that is no
-/// failure; empty for an arm whose settings are not derived.
+/// Describes each run that the arm cannot perform at the full size of its paths, with the reason, and each fault that is not a
+/// failure. Empty for an arm whose settings are not derived.
 pub fn arm_notes(summary: &Summary) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(derived) = &summary.derived {
@@ -79,7 +79,7 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
         format!("{} N m", terms.join(", "))
     };
     let (ideal, imperfect) = plants(summary);
-    // A given model is perturbed in no run.
+    // A model given by the user is not perturbed in any run.
     let given_model = summary.model.is_some();
     let realistic = summary
         .realistic
@@ -182,10 +182,10 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
     lines
 }
 
-/// Names of the plant of most rows, and of the one on which the model is calibrated.
+/// Returns the name of the plant of most rows, and of the plant on which the model is calibrated.
 pub(crate) fn plants(summary: &Summary) -> (&'static str, &'static str) {
     match summary.plant.is_none() {
-        // A given model is not that of the realistic plant: the demo calibrates there.
+        // A model given by the user is not used on the realistic plant, on which the demo calibrates a model.
         true if summary.model.is_some() => ("ideal plant", "realistic plant, its own model"),
         true => ("ideal plant", "realistic plant"),
         false => ("given plant", "given plant"),
@@ -334,7 +334,7 @@ fn contact(summary: &Summary) -> Vec<Line> {
     ]
 }
 
-/// The largest of the numbers; not a number without any.
+/// Returns the largest value, or NaN if there are none.
 pub(crate) fn worst(values: &[f64]) -> f64 {
     values.iter().copied().fold(f64::NAN, f64::max)
 }

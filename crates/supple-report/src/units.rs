@@ -1,9 +1,9 @@
-//! Formats numbers for people: three significant figures, a unit, a typographic minus sign.
+//! Formats numbers for display: three significant figures, a unit, a typographic minus sign.
 
-/// In place of a value of a run that was left out.
+/// Text in place of a value of a run that was left out.
 pub const LEFT_OUT: &str = "left out";
 
-/// Three significant figures.
+/// Formats a number with three significant figures.
 pub fn figures(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return plain(value, 0);
@@ -12,7 +12,7 @@ pub fn figures(value: f64) -> String {
     plain(value, usize::try_from(2 - magnitude).unwrap_or(0))
 }
 
-/// Fixed number of decimals; a value that a run left out gives is no number.
+/// Formats a number with a fixed number of decimals; a value that is not a number is of a run that was left out.
 pub fn plain(value: f64, decimals: usize) -> String {
     if value.is_nan() {
         return LEFT_OUT.to_owned();
@@ -20,7 +20,7 @@ pub fn plain(value: f64, decimals: usize) -> String {
     format!("{value:.decimals$}").replace('-', "\u{2212}")
 }
 
-/// Metres, in millimetres.
+/// Formats metres as millimetres.
 pub fn mm(metres: f64) -> String {
     if metres.is_nan() {
         return LEFT_OUT.to_owned();
@@ -28,27 +28,27 @@ pub fn mm(metres: f64) -> String {
     format!("{} mm", plain(1e3 * metres, 1))
 }
 
-/// Newtons.
+/// Formats newtons.
 pub fn newtons(value: f64) -> String {
     format!("{} N", figures(value))
 }
 
-/// Newton seconds.
+/// Formats newton seconds.
 pub fn newton_seconds(value: f64) -> String {
     format!("{} N s", figures(value))
 }
 
-/// Newton metres.
+/// Formats newton metres.
 pub fn newton_metres(value: f64) -> String {
     format!("{} N m", figures(value))
 }
 
-/// A fraction, in percent.
+/// Formats a fraction as percent.
 pub fn percent(fraction: f64) -> String {
     format!("{} %", figures(100.0 * fraction))
 }
 
-/// Seconds.
+/// Formats seconds.
 pub fn seconds(value: f64) -> String {
     format!("{} s", plain(value, 2))
 }

@@ -32,9 +32,9 @@ use supple_realtime::{Stop, monotonic_ns};
 
 /// Time without a state after which the loop repeats the step with the last state.
 pub const PLANT_TIMEOUT: Duration = Duration::from_millis(20);
-/// Cycles that the plant has to switch the drives to idle during shutdown.
+/// Maximum number of cycles until the plant has switched the drives to idle during shutdown.
 const SHUTDOWN_CYCLES: u32 = 250;
-/// Cycles that one timeout counts for.
+/// Number of shutdown cycles that one timeout of a wait for a state counts as.
 const CYCLES_PER_TIMEOUT: u32 = 20;
 
 /// Maximum number of states of another arm that one iteration discards.
@@ -52,17 +52,17 @@ pub struct ControlLoop<const N: usize> {
     steps: u64,
     last_begin_ns: Option<u64>,
     last: Option<StepRecord<N>>,
-    /// The telemetry of the last step has not been sent to the helper yet.
+    /// Whether the telemetry of the last step still has to be sent to the helper.
     telemetry_pending: bool,
     /// Channel for idle requests.
     idle_channel: Option<LoopIdleChannel>,
-    /// Idle requests from the request queue.
+    /// Idle requests of operators, from the request queue.
     queued_idle: RequestQueue,
     /// Cycle in which idle was last accepted; 0 before the first state.
     last_idle: Option<u64>,
-    /// Number of arm states discarded here, and by the link.
+    /// Numbers of arm states that the loop has discarded, and that the link has discarded.
     states_dropped: (u64, u64),
-    /// Cycles since the shutdown began.
+    /// Number of cycles since the shutdown began; `None` before it.
     shutting_down: Option<u32>,
 }
 
@@ -70,12 +70,12 @@ pub struct ControlLoop<const N: usize> {
 #[derive(Clone, Copy, Debug)]
 #[expect(
     clippy::large_enum_variant,
-    reason = "the loop's thread allocates nothing: no request is boxed"
+    reason = "the loop's thread may not allocate memory, so a request cannot be boxed"
 )]
 enum RequestSource {
-    /// An operator request, after the number of those that arrived before it and are still queued.
+    /// An operator request, preceded by the number of requests that arrived before it and are still queued.
     Operator(usize, OperatorRequest),
-    /// All idle requests; the value is the last request number on the idle channel, if any came there.
+    /// All idle requests; the value is the number of the last request on the idle channel, if it has a pending request.
     Idle(Option<u64>),
     /// The loop itself, during shutdown.
     Shutdown,
@@ -83,7 +83,7 @@ enum RequestSource {
     Learner,
 }
 
-/// A step with its telemetry data.
+/// A step: its input, output and timing, for the telemetry.
 #[derive(Debug)]
 struct StepRecord<const N: usize> {
     arm: ArmState,
@@ -119,10 +119,10 @@ impl<const N: usize> ControlLoop<N> {
         self.idle_channel = Some(channel);
     }
 
-    /// Answers states until shutdown is requested and the drives are idle, or the plant does not respond.
+    /// Answers states until a shutdown is requested and the drives are idle, or the plant does not answer during the shutdown.
     ///
     /// # Errors
-    /// [`RtError`]: shared memory, or a state of another arm.
+    /// [`RtError`] if shared memory fails, or a state is of another arm.
     pub fn run(&mut self, link: &ControllerLink, stop: &Stop) -> Result<(), RtError> {
         let result = loop {
             match self.run_iteration(link, stop) {
@@ -130,7 +130,7 @@ impl<const N: usize> ControlLoop<N> {
                 result => break result.map(|_| ()),
             }
         };
-        // No announcement will follow, so send the last telemetry now.
+        // No announcement follows, so the last telemetry is sent now.
         self.flush_telemetry();
         result
     }
@@ -138,10 +138,10 @@ impl<const N: usize> ControlLoop<N> {
     /// One iteration: waits for a state and answers it, or times out. Returns false when the loop must end.
     ///
     /// # Errors
-    /// As [`ControlLoop::run`].
+    /// The same as those of [`ControlLoop::run`].
     pub fn run_iteration(&mut self, link: &ControllerLink, stop: &Stop) -> Result<bool, RtError> {
         self.queues.liveness.increment();
-        // If no request can be received any more, shut down: an arm that cannot be stopped must not keep moving.
+        // If no request can arrive any more, the loop shuts down: an arm that cannot be stopped must not move.
         let unreachable_by_operators = self.queues.peer_dropped()
             || self
                 .idle_channel
@@ -189,7 +189,7 @@ impl<const N: usize> ControlLoop<N> {
         self.timing
     }
 
-    /// The first of `arm` and the states after it that belongs to this arm.
+    /// Returns the first state of this arm, from `arm` and the unread states after it.
     fn first_matching_state(
         &mut self,
         link: &ControllerLink,
@@ -207,7 +207,7 @@ impl<const N: usize> ControlLoop<N> {
         Ok(None)
     }
 
-    /// Whether the state is of this arm; counts the others, and those that the link has discarded.
+    /// Whether the state is of this arm. Counts states of other arms, and states that the link has discarded.
     fn accepts_state(&mut self, link: &ControllerLink, arm: &ArmState) -> bool {
         let before = self.states_dropped;
         let is = arm.matches_dof::<N>();
@@ -220,7 +220,7 @@ impl<const N: usize> ControlLoop<N> {
         is
     }
 
-    /// Only states of another arm arrived: handled as a timeout once PLANT_TIMEOUT has passed.
+    /// Handles the case that only states of another arm arrived: as a timeout, once [`PLANT_TIMEOUT`] has passed.
     fn handle_foreign_state(&mut self) -> Result<bool, RtError> {
         let now_ns = monotonic_ns();
         let since_ns = self.last_begin_ns.get_or_insert(now_ns);
@@ -233,7 +233,7 @@ impl<const N: usize> ControlLoop<N> {
         }
     }
 
-    /// No state arrived within the timeout.
+    /// Handles the case that no state arrived within the timeout.
     fn handle_timeout(&mut self) -> Result<bool, RtError> {
         if let Some(cycles) = &mut self.shutting_down {
             *cycles += CYCLES_PER_TIMEOUT;
@@ -245,8 +245,8 @@ impl<const N: usize> ControlLoop<N> {
                 self.cycle(&arm)?;
             }
             Some(_) => {}
-            // No cycle has run yet, so the controller is idle already: confirm the idle request, which ends what was
-            // requested before it.
+            // No cycle has run yet, so the controller is already idle: the idle request is accepted, and earlier requests are
+            // refused.
             None => {
                 if let Some(number) = self.pending_idle() {
                     self.last_idle = Some(0);
@@ -259,8 +259,8 @@ impl<const N: usize> ControlLoop<N> {
         Ok(true)
     }
 
-    /// Runs the step with its result discarded, to load code and data into the caches: after a period of other work the
-    /// cache misses would cost more than the step.
+    /// Runs the step with its result discarded, to load code and data into the caches: after other work, cache misses
+    /// would take longer than the step itself.
     fn warm_up_caches(&mut self) -> Result<(), RtError> {
         if let Some(last) = &self.last {
             let mut input = last.arm.input::<N>(None)?;
@@ -282,7 +282,7 @@ impl<const N: usize> ControlLoop<N> {
     fn step(&mut self, arm: &ArmState) -> Result<&StepRecord<N>, RtError> {
         self.flush_telemetry();
         let begin_ns = monotonic_ns();
-        // A plant that was started anew counts from zero.
+        // A restarted plant counts its cycles from zero.
         if self.last_idle.is_some_and(|idle| arm.cycle < idle) {
             self.last_idle = Some(0);
         }
@@ -299,12 +299,12 @@ impl<const N: usize> ControlLoop<N> {
         if matches!(input.request, Some(Request::Idle)) && output.refusal.is_none() {
             self.last_idle = Some(arm.cycle);
         }
-        // Requests that were queued before this one, in their number.
+        // Number of queued requests that this request ends.
         let ended = match (&received, input.request) {
             _ if output.fault.is_some() && !had_fault => self.queued.len(),
             _ if output.refusal.is_some() => 0,
             (_, Some(Request::Idle)) | (Some((RequestSource::Shutdown, _)), _) => self.queued.len(),
-            // Somebody wants the arm to rest now: what was scheduled before must not move it later.
+            // The operator requests a mode without motion now: a motion that was scheduled before must not begin later.
             (
                 Some((RequestSource::Operator(earlier, message), _)),
                 Some(Request::GravityHold | Request::Float),
@@ -313,7 +313,7 @@ impl<const N: usize> ControlLoop<N> {
         };
         self.refuse_queued(ended, arm.cycle, output.mode);
         if deactivated {
-            // Who activates the drives again expects no motion that was scheduled before.
+            // An operator who activates the drives again does not expect a motion that was scheduled before.
             let reason = &"the drives became inactive";
             self.refuse_queued_if(arm.cycle, output.mode, reason, |_, request| {
                 is_motion(request)
@@ -337,14 +337,14 @@ impl<const N: usize> ControlLoop<N> {
         }))
     }
 
-    /// Number of the last request on the idle channel, if it was not answered yet.
+    /// Returns the number of the last request on the idle channel, if it has not been answered.
     fn pending_idle(&self) -> Option<u64> {
         self.idle_channel
             .as_ref()
             .and_then(LoopIdleChannel::pending_request)
     }
 
-    /// Takes the requests that have arrived into the loop's own queues.
+    /// Moves the requests that have arrived into the loop's own queues.
     fn receive_requests(&mut self, cycle: u64) {
         while let Ok(&request) = self.queues.requests.peek() {
             if request.requests_idle_now() {
@@ -361,7 +361,7 @@ impl<const N: usize> ControlLoop<N> {
         }
     }
 
-    /// The request of this cycle, if there is one; idle requests come first.
+    /// Returns the request to execute in this cycle; idle requests come first.
     fn next_request(&mut self, cycle: u64) -> Option<(RequestSource, Request<N>)> {
         let number = self.pending_idle();
         self.receive_requests(cycle);
@@ -376,7 +376,7 @@ impl<const N: usize> ControlLoop<N> {
         };
         if let Some(idle) = self.last_idle.filter(|idle| message.is_before(*idle)) {
             let text = Text::of(&format_args!(
-                "refused: it is for cycle {}, and idle was accepted since then, in cycle {idle}",
+                "refused: the request is for cycle {}, but idle was accepted in cycle {idle}",
                 message.at_cycle
             ));
             self.reply(&message, cycle, self.state.mode(), Outcome::Refused, text);
@@ -395,7 +395,7 @@ impl<const N: usize> ControlLoop<N> {
         }
     }
 
-    /// What is learned and due; in a cycle in which no operator requests anything.
+    /// Returns the next due request of the learner; called in cycles without an operator request.
     fn next_learned(&mut self, cycle: u64) -> Option<(RequestSource, Request<N>)> {
         let learned = &mut self.queues.learned;
         if !learned.peek().is_ok_and(|message| message.is_due(cycle)) {
@@ -419,7 +419,7 @@ impl<const N: usize> ControlLoop<N> {
             RequestSource::Operator(_, request) => {
                 self.reply(request, output.cycle, output.mode, outcome, text);
             }
-            // Repeated in the next cycle until the torque is off.
+            // The shutdown request is repeated in the next cycle until the torque is off.
             RequestSource::Idle(_) if outcome == Outcome::Accepted && !output.torque_off => {}
             RequestSource::Idle(number) => {
                 if let Some(number) = number {
@@ -440,8 +440,7 @@ impl<const N: usize> ControlLoop<N> {
         }
     }
 
-    /// Refuses the first `count` queued requests, which were sent under other conditions; idle requests stay valid and
-    /// are kept.
+    /// Refuses the first `count` queued requests except idle requests, because they were sent under other conditions.
     fn refuse_queued(&mut self, count: usize, cycle: u64, mode: Mode) {
         if count > 0 {
             let reason = &format_args!("the controller changed to mode {}", mode.name());
@@ -467,7 +466,9 @@ impl<const N: usize> ControlLoop<N> {
             if !refused(position, &request) && kept.push(request).is_ok() {
                 continue;
             }
-            let text = Text::of(&format_args!("refused: it was queued when {reason}"));
+            let text = Text::of(&format_args!(
+                "refused: the request was still queued when {reason}"
+            ));
             self.reply(&request, cycle, mode, Outcome::Refused, text);
         }
         self.queued = kept;
@@ -486,8 +487,8 @@ impl<const N: usize> ControlLoop<N> {
         let _ = self.queues.replies.push(reply);
     }
 
-    /// Sends the telemetry of the last step to the helper, if not sent yet. If the queue is full, the record is lost
-    /// and leaves a gap in the step numbers; in virtual time the loop waits instead.
+    /// Sends the telemetry of the last step to the helper, unless it has been sent. If the queue is full, the record is lost,
+    /// which leaves a gap in the step numbers; in virtual time the loop waits instead.
     fn flush_telemetry(&mut self) {
         let (Some(last), true) = (&self.last, self.telemetry_pending) else {
             return;

@@ -1,4 +1,4 @@
-//! The last cycles before a fault, as a table on the disk; a thread of its own waits for the disk.
+//! Writes the last cycles before a fault to the disk as a table. A separate thread waits for the disk.
 
 use core::time::Duration;
 use std::fmt::Write as _;
@@ -12,14 +12,14 @@ use supple_core::record::{Cell, for_each_column};
 use supple_ipc::message::{MAX_DOF, Telemetry};
 use supple_realtime::{BackgroundWriter, create_private_folder, diagnostics};
 
-/// Cycles that are kept.
+/// Number of cycles that are kept.
 pub const KEPT_CYCLES: usize = 1000;
-/// Tables that are kept in the folder: the newest.
+/// Number of tables that are kept in the folder, the newest ones.
 pub const KEPT_FILES: usize = 20;
-/// Tables that may wait for the disk, some megabytes each.
-const WAITING: usize = 2;
+/// Maximum number of tables that wait for the disk, each of some megabytes.
+const MAX_WAITING_TABLES: usize = 2;
 
-/// Where the tables go, and who writes them there.
+/// Folder of the fault tables, with the thread that writes them.
 #[derive(Debug)]
 pub struct FaultFiles {
     writer: BackgroundWriter,
@@ -27,43 +27,43 @@ pub struct FaultFiles {
 }
 
 impl FaultFiles {
-    /// Starts the thread that writes.
+    /// Starts the thread that writes the tables.
     ///
     /// # Errors
-    /// Where the system gives no thread.
+    /// If the thread cannot be started.
     pub fn start(folder: PathBuf) -> io::Result<FaultFiles> {
         Ok(FaultFiles {
-            writer: BackgroundWriter::start("supple-rt-disk", WAITING)?,
+            writer: BackgroundWriter::start("supple-rt-disk", MAX_WAITING_TABLES)?,
             folder: folder.into(),
         })
     }
 
-    /// Hands a table over; where too many wait for the disk, it is lost, counted and reported.
+    /// Queues a table for the disk. If too many tables wait, the table is lost, counted and reported.
     fn write(&self, table: Table, step: u64) {
         let folder = self.folder.clone();
         let accepted = self.writer.submit(move || table.save(&folder, step));
         if !accepted {
             diagnostics::post(format_args!(
-                "supple-rt: warning: the disk of {} is behind: the last cycles before this fault are lost, as of {} \
-                 faults so far; choose another folder with --fault-dir",
+                "supple-rt: warning: the disk of {} is too slow: the last cycles before this fault are lost, as were those of \
+                 {} faults in total; choose another folder with --fault-dir",
                 self.folder.display(),
                 self.writer.dropped()
             ));
         }
     }
 
-    /// Tables that were lost.
+    /// Returns the number of lost tables.
     pub fn dropped(&self) -> u64 {
         self.writer.dropped()
     }
 
-    /// The thread that writes, to be handed other work.
+    /// Returns the thread that writes the tables, so that it can run other jobs.
     pub fn writer(&self) -> &BackgroundWriter {
         &self.writer
     }
 }
 
-/// The last [`KEPT_CYCLES`] cycles; a fault that latches sends them to the disk.
+/// Keeps the last [`KEPT_CYCLES`] cycles, and writes them to the disk when a fault latches.
 #[derive(Debug)]
 pub struct FaultRecorder {
     cycles: Table,
@@ -71,16 +71,16 @@ pub struct FaultRecorder {
     files: FaultFiles,
 }
 
-/// Cycles in a ring.
+/// Ring buffer of cycles.
 #[derive(Clone, Debug)]
 struct Table {
     kept: Vec<Telemetry>,
-    /// Where the next one goes, once all places are taken.
+    /// Index of the oldest cycle, which the next cycle overwrites once the buffer is full.
     next: usize,
 }
 
 impl FaultRecorder {
-    /// None yet.
+    /// Creates a recorder without cycles.
     pub fn new(files: FaultFiles) -> FaultRecorder {
         FaultRecorder {
             cycles: Table {
@@ -92,8 +92,8 @@ impl FaultRecorder {
         }
     }
 
-    /// A cycle. Where a fault has just latched, it is reported on standard error, and the table is handed to the thread
-    /// that writes; neither is waited for.
+    /// Adds a cycle. If a fault has just latched, reports the fault on standard error and queues the table for the disk, without
+    /// waiting for either.
     pub fn add(&mut self, telemetry: &Telemetry) {
         let Table { kept, next } = &mut self.cycles;
         if kept.len() < KEPT_CYCLES {
@@ -111,7 +111,7 @@ impl FaultRecorder {
         }
     }
 
-    /// Waits for the disk at most for `timeout`, and reports if it is not done by then.
+    /// Waits for at most `timeout` until all tables are written; reports if they are not.
     pub fn finish(&self, timeout: Duration) {
         if !self.files.writer.flush(timeout) {
             diagnostics::post(format_args!(
@@ -121,13 +121,13 @@ impl FaultRecorder {
         }
     }
 
-    /// Where the tables go.
+    /// Returns the folder of the tables with its thread.
     pub fn files(&self) -> &FaultFiles {
         &self.files
     }
 }
 
-/// Name of a table; `None` for what is none.
+/// Whether this is the name of a table.
 fn is_table(name: &str) -> bool {
     let numbers = name
         .strip_prefix("fault-")
@@ -137,7 +137,7 @@ fn is_table(name: &str) -> bool {
     numbers.is_some_and(|(process, step)| digits(process) && digits(step))
 }
 
-/// Removes the oldest tables of this user, so that [`KEPT_FILES`] are left. What is no table stays.
+/// Removes the oldest tables of this user, so that [`KEPT_FILES`] tables are left. Does not remove other files.
 fn prune(folder: &Path) -> io::Result<()> {
     let user = rustix::process::getuid().as_raw();
     let mut tables = Vec::new();
@@ -157,7 +157,7 @@ fn prune(folder: &Path) -> io::Result<()> {
 }
 
 impl Table {
-    /// Writes it and reports where; failures are reported too.
+    /// Writes the table to a file, and reports its path or the error.
     fn save(&self, folder: &Path, step: u64) {
         match self.write(folder, step) {
             Ok(file) => diagnostics::post(format_args!(
@@ -190,7 +190,7 @@ impl Table {
             .and_then(|()| table.sync_all())
             .and_then(|()| fs::rename(&part, &file));
         if let Err(error) = written {
-            // What is not whole is of no use, and takes room that others want.
+            // An incomplete table is removed.
             let _ = fs::remove_file(&part);
             return Err(error);
         }
@@ -198,7 +198,7 @@ impl Table {
         Ok(file)
     }
 
-    /// The table, oldest cycle first.
+    /// Returns the table as text, oldest cycle first.
     fn text(&self) -> String {
         let (newer, older) = self.kept.split_at(self.next);
         let cycles = older.iter().chain(newer);
@@ -212,13 +212,13 @@ impl Table {
     }
 }
 
-/// Columns that are not of the controller's record.
-const PLANT: &str =
+/// Names of the columns that are not part of the controller's record.
+const PLANT_COLUMNS: &str =
     "stamp_ns,drives,missed,late,tx_lost,wake_ns,round_trip_ns,period_ns,latency_ns,step_ns";
 
-/// Column names, those of a record as `supple log export` has them, joints by their numbers from 0.
+/// Appends the column names. The columns of the record have the names of `supple log export`, with joints numbered from 0.
 fn header(table: &mut String, dof: usize) {
-    table.push_str(PLANT);
+    table.push_str(PLANT_COLUMNS);
     for_each_column(CycleRecord::<MAX_DOF>::FIELDS, &[], dof, |column, _| {
         let _ = write!(table, ",{column}");
     });
@@ -243,7 +243,7 @@ fn row(table: &mut String, t: &Telemetry, dof: usize) {
     );
     for_each_column(CycleRecord::<MAX_DOF>::FIELDS, t.words(), dof, |_, cell| {
         let _ = match cell {
-            // No comma but between columns: a table that any reader takes apart.
+            // A comma only separates columns, so that every CSV reader can read the table.
             Cell::Text(_) => write!(table, ",{}", cell.to_string().replace(',', ";")),
             cell => write!(table, ",{cell}"),
         };

@@ -1,7 +1,7 @@
 //! The helper thread: telemetry, requests and replies. It never blocks: separate threads write to the disk and to
 //! standard error.
 
-use crate::deferred::{MotionPlan, Pose, StartPose, WaitingMotions, ends_motions};
+use crate::deferred::{MotionPlan, Pose, StartPose, WaitingMotions, cancels_motions};
 use crate::error::RtError;
 use crate::fault_file::{FaultFiles, FaultRecorder};
 use crate::learning::Learning;
@@ -24,28 +24,28 @@ const POLL_INTERVAL: Duration = Duration::from_millis(1);
 const MAX_PER_ITERATION: usize = 256;
 /// Maximum number of set-points that one iteration checks.
 const MAX_SET_POINTS_PER_ITERATION: usize = 8;
-/// Folder for faults beside the system's sockets.
+/// Name of the folder for fault tables, in the folder of the system's sockets.
 const FAULT_FOLDER: &str = "faults";
-/// Maximum time that the shutdown waits for the disk.
+/// Maximum time for which the shutdown waits for the disk.
 const DISK_TIMEOUT: Duration = Duration::from_secs(2);
 
 /// Checks whether a requested motion is feasible over its whole length, from its start pose if that is known
 /// ([`supple_core::controller::check_motion()`]); otherwise whether its target is. Returns the end pose, if known.
 ///
 /// # Errors
-/// The refusal in words.
+/// Text of the refusal.
 pub type MotionCheck =
     Box<dyn Fn(&OperatorRequest, Option<&Pose>) -> Result<Option<Pose>, String> + Send>;
 
-/// Feasibility check for an arm of `N` joints. Invalid requests pass; the loop refuses them.
+/// Creates the feasibility check of an arm with `N` joints. An invalid request passes the check; the loop refuses it.
 pub fn motion_check<const N: usize>(controller: Controller<N>) -> MotionCheck {
     Box::new(move |message, from_rad| {
         let Ok(Some(request)) = message.request::<N>() else {
             return Ok(None);
         };
         let from_rad = from_rad.map(|from_rad| Vector::from_fn(|i, _| from_rad[i]));
-        // If the pose is unknown, an excitation is checked from its own centre, near which it starts, and a motion of the
-        // joints at its target, for workspace and torque.
+        // If the start pose is unknown, an excitation is checked from its centre, near which it starts. For a joint motion, the
+        // workspace and the torque at its target are checked.
         let from_rad = match &request {
             Request::Excite(series) => from_rad.or(Some(series.centre_rad)),
             Request::Move { target_rad, .. } | Request::JointImpedance { target_rad, .. } => {
@@ -107,7 +107,7 @@ impl Helper {
         let helper = Helper { thread };
         match is_ready.recv() {
             Ok(()) => Ok(helper),
-            // The thread ended before it was ready; return its error.
+            // The thread ended before it was ready: its error is returned.
             Err(_) => helper.finish().and(Err(RtError::Helper)),
         }
     }
@@ -133,7 +133,7 @@ fn work(
     ready: &SyncSender<()>,
 ) -> Result<(), IpcError> {
     let link = OperatorServer::new(domain, backpressure)?;
-    // The receiver is gone only if the start was aborted.
+    // The receiver is dropped only if the start was aborted.
     let _ = ready.send(());
     let mut state = HelperState {
         link,
@@ -155,7 +155,7 @@ fn work(
         let ended = state.queues.ended();
         state.requests();
         state.telemetry();
-        state.due_motion();
+        state.check_due_motion();
         state.replies();
         if ended {
             state.fault_recorder.finish(DISK_TIMEOUT);
@@ -165,7 +165,7 @@ fn work(
     }
 }
 
-/// State of the helper thread. A failing port does not end the thread; the next message tries the port again.
+/// State of the helper thread. An error of a port does not end the thread; the next message uses the port again.
 struct HelperState {
     link: OperatorServer,
     queues: HelperQueues,
@@ -178,7 +178,7 @@ struct HelperState {
     /// Last known joint angles, and their cycle.
     position_rad: Option<Pose>,
     cycle: u64,
-    /// Poses between the motions that were requested.
+    /// Start pose of the next motion.
     plan: MotionPlan,
     /// Motions that wait for their cycle.
     waiting: WaitingMotions,
@@ -188,12 +188,12 @@ struct HelperState {
 
 impl HelperState {
     fn requests(&mut self) {
-        // Idle requests are forwarded without a check; of the others one is checked per iteration, because the check
-        // of a whole motion takes milliseconds.
+        // Idle requests are forwarded without a check. One other request is checked per iteration, because the check of a
+        // whole motion takes milliseconds.
         while self.awaiting_check.len() < MAX_PER_ITERATION {
             match self.link.request() {
                 Ok(Some(request)) if request.requests_idle_now() => {
-                    self.end_motions();
+                    self.cancel_motions();
                     self.enqueue(request);
                 }
                 Ok(Some(request)) => self.awaiting_check.push_back(request),
@@ -204,7 +204,7 @@ impl HelperState {
                 }
             }
         }
-        // A set-point takes microseconds.
+        // The check of a set-point takes microseconds.
         for _ in 0..MAX_SET_POINTS_PER_ITERATION {
             let Some(request) = self.awaiting_check.pop_front() else {
                 return;
@@ -216,10 +216,10 @@ impl HelperState {
         }
     }
 
-    /// Checks a request, then passes it on, keeps it or refuses it.
+    /// Checks a request, then passes it to the loop, keeps it until its cycle or refuses it.
     fn check(&mut self, request: OperatorRequest) {
-        if ends_motions(&request) {
-            self.end_motions();
+        if cancels_motions(&request) {
+            self.cancel_motions();
         }
         let from_rad = match self.plan.start_pose(&request) {
             StartPose::Present => self.position_rad,
@@ -227,10 +227,12 @@ impl HelperState {
             StartPose::Unknown => None,
         };
         match (self.motion_check)(&request, from_rad.as_ref()) {
-            Ok(end_rad) if !self.virtual_time && WaitingMotions::keeps(&request, self.cycle) => {
+            Ok(end_rad)
+                if !self.virtual_time && WaitingMotions::must_wait(&request, self.cycle) =>
+            {
                 match self.waiting.push(request) {
                     Ok(()) => {
-                        self.plan.passed(&request, end_rad);
+                        self.plan.record_accepted(&request, end_rad);
                         self.reply(&reply_before_step(&request, Outcome::Queued, ""));
                     }
                     Err(full) => {
@@ -240,7 +242,7 @@ impl HelperState {
                 }
             }
             Ok(end_rad) => {
-                self.plan.passed(&request, end_rad);
+                self.plan.record_accepted(&request, end_rad);
                 self.enqueue(request);
             }
             Err(text) => {
@@ -255,42 +257,42 @@ impl HelperState {
             // The loop reads the request before the step of its cycle.
             (true, true) => self.reply(&reply_before_step(&request, Outcome::Queued, "")),
             (true, false) => {}
-            (false, _) => self.refuse_for_now(&request),
+            (false, _) => self.refuse_because_queue_is_full(&request),
         }
     }
 
-    fn refuse_for_now(&mut self, request: &OperatorRequest) {
+    fn refuse_because_queue_is_full(&mut self, request: &OperatorRequest) {
         let text = "refused: too many requests at once";
         self.reply(&reply_before_step(request, Outcome::Refused, text));
     }
 
-    /// Checks a motion that waited, from the pose in which the arm is now, and passes it to the loop. One per iteration.
-    fn due_motion(&mut self) {
-        let Some(request) = self.waiting.pop(self.cycle) else {
+    /// Checks the next due motion from the present pose of the arm, and passes it to the loop; one motion per iteration.
+    fn check_due_motion(&mut self) {
+        let Some(request) = self.waiting.pop_due(self.cycle) else {
             return;
         };
         match (self.motion_check)(&request, self.position_rad.as_ref()) {
             Ok(_) => {
                 if !self.queues.request(request) {
-                    self.refuse_for_now(&request);
+                    self.refuse_because_queue_is_full(&request);
                 }
             }
             Err(text) => self.refuse_waiting(&request, &text),
         }
     }
 
-    /// Refuses the motions that wait, because the arm is to rest, or is in a fault.
-    fn end_motions(&mut self) {
-        self.plan.ended();
-        while let Some(request) = self.waiting.take() {
-            let text = "refused: while it waited, a mode at rest was requested, a fault was latched or the drives became inactive";
+    /// Refuses all waiting motions.
+    fn cancel_motions(&mut self) {
+        self.plan.reset();
+        while let Some(request) = self.waiting.pop() {
+            let text = "refused: while the motion waited, a mode without motion was requested, a fault latched or the drives became inactive";
             self.refuse_waiting(&request, text);
         }
     }
 
     fn refuse_waiting(&mut self, request: &OperatorRequest, text: &str) {
         let reply = reply_before_step(request, Outcome::Refused, text);
-        self.plan.replied(&reply);
+        self.plan.handle_reply(&reply);
         self.reply(&reply);
     }
 
@@ -306,13 +308,13 @@ impl HelperState {
             let record = telemetry.record();
             self.position_rad = Some(record.position_rad.into());
             self.cycle = telemetry.state.cycle;
-            self.plan.cycle(self.cycle);
+            self.plan.update(self.cycle);
             let active = telemetry.state.drives() == Drives::Active;
-            if (self.waiting).is_ended_by(record.mode(), record.fault != 0, active) {
-                self.end_motions();
+            if (self.waiting).cancelled_by(record.mode(), record.fault != 0, active) {
+                self.cancel_motions();
             }
             for request in (self.learning)(&telemetry) {
-                // If the queue is full, it is lost: the next estimate follows.
+                // If the queue is full, the request is lost; a later estimate replaces it.
                 self.queues.learned(request);
             }
         }
@@ -330,7 +332,7 @@ impl HelperState {
             let Some(reply) = self.queues.reply() else {
                 break;
             };
-            self.plan.replied(&reply);
+            self.plan.handle_reply(&reply);
             self.reply(&reply);
         }
     }
@@ -350,7 +352,7 @@ impl HelperState {
     }
 }
 
-/// A reply that the helper sends itself, before the loop sees the request.
+/// Creates a reply of the helper to a request that the loop has not received.
 fn reply_before_step(request: &OperatorRequest, outcome: Outcome, text: &str) -> OperatorReply {
     OperatorReply::new(request, 0, Mode::Idle, outcome, Text::of(&text))
 }

@@ -1,5 +1,5 @@
 //! The thread that receives idle requests. It uses no shared-memory port, no disk and no standard error, so nothing can
-//! block it; the file of its socket is looked for twice a second, and created anew if something has removed it.
+//! block it. Twice a second it checks that the file of its socket exists, and creates a new socket if the file is missing.
 
 use crate::error::RtError;
 use crate::queues::IdleThreadChannel;
@@ -11,14 +11,14 @@ use supple_realtime::{Settings, apply_realtime_settings, diagnostics};
 
 /// Poll interval while no request is pending.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
-/// Interval at which the socket's file is looked for.
+/// Interval at which the thread checks that the socket's file exists.
 const RESTORE_INTERVAL: Duration = Duration::from_millis(500);
 /// Poll interval for the loop's reply while a request is pending.
 const REPLY_POLL_INTERVAL: Duration = Duration::from_micros(500);
-/// Priority relative to the loop's: lower by this much.
+/// Difference by which the thread's priority is lower than the loop's.
 const PRIORITY_OFFSET: u8 = 1;
 
-/// The running thread.
+/// The running thread for idle requests.
 #[derive(Debug)]
 pub struct IdleRequestThread {
     thread: JoinHandle<Result<(), IpcError>>,
@@ -29,7 +29,7 @@ impl IdleRequestThread {
     /// call this.
     ///
     /// # Errors
-    /// [`RtError::Ipc`] if the socket cannot be created, [`RtError::Thread`].
+    /// [`RtError::Ipc`] if the socket cannot be created, [`RtError::Thread`] if the thread cannot be started.
     pub fn start(
         domain: &Domain,
         channel: IdleThreadChannel,
@@ -40,7 +40,7 @@ impl IdleRequestThread {
             priority: realtime
                 .priority
                 .map(|p| p.saturating_sub(PRIORITY_OFFSET).max(1)),
-            // Not bound to a processor.
+            // This thread is not bound to a processor.
             cpu: None,
             lock_memory: false,
         };
@@ -58,7 +58,7 @@ impl IdleRequestThread {
     /// Waits for the thread, which ends after the loop.
     ///
     /// # Errors
-    /// [`RtError::Ipc`] if its socket failed, [`RtError::Helper`].
+    /// [`RtError::Ipc`] if its socket failed, [`RtError::Helper`] if the thread panicked.
     pub fn finish(self) -> Result<(), RtError> {
         match self.thread.join() {
             Ok(worked) => Ok(worked?),
@@ -75,7 +75,7 @@ fn work(mut server: IdleServer, mut channel: IdleThreadChannel) -> Result<(), Ip
             looked = Instant::now();
             if server.restore() {
                 diagnostics::post(
-                    "supple-rt: warning: the socket of idle requests was removed and is created anew; keep other programs \
+                    "supple-rt: warning: the socket of idle requests was removed and has been created again; keep other programs \
                      from removing files of a running system",
                 );
             }

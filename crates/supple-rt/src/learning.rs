@@ -1,8 +1,8 @@
-//! Learning in the helper thread: records in, requests for the loop and files out.
+//! Learning in the helper thread: it receives records, and produces requests for the loop and files.
 //!
-//! Each estimate is for a cycle that lies further ahead than all queues between loop and helper are long, so that in
-//! virtual time its cycle does not depend on the speed of the threads. The arm with what is learned is written to a
-//! folder of the system by the thread that waits for the disk; `supple learning save` copies it from there.
+//! Each estimate takes effect in a cycle that is further ahead than the total length of all queues between loop and helper.
+//! In virtual time, this cycle therefore does not depend on the speed of the threads. A separate thread writes the
+//! description of the arm with the learned terms to a folder of the system; `supple learning save` copies it from there.
 
 use std::io::ErrorKind;
 use std::sync::Arc;
@@ -14,18 +14,18 @@ use supple_learning::Learner;
 use supple_model::{Description, ModelError};
 use supple_realtime::{BackgroundWriter, diagnostics};
 
-/// Takes the record of a cycle; returns the requests of an estimate, if there is a new one.
+/// Processes the record of a cycle; returns the requests that carry a new estimate, if there is one.
 pub type Learning = Box<dyn FnMut(&Telemetry) -> Vec<OperatorRequest> + Send>;
 
-/// Id of the learner as an operator; no client has it, and nobody is answered.
+/// Operator id of the learner. No client has this id, and no reply is sent to it.
 const LEARNER: u64 = 0;
-/// Files that may wait for the disk.
-const WAITING: usize = 2;
+/// Maximum number of files that wait for the disk.
+const MAX_WAITING_FILES: usize = 2;
 
-/// Learning for an arm of `N` joints.
+/// Creates the learning of an arm with `N` joints.
 ///
 /// # Errors
-/// If the system gives no thread.
+/// If the thread for the disk cannot be started.
 pub fn learning<const N: usize>(
     config: &Config<N>,
     description: &Description,
@@ -33,7 +33,7 @@ pub fn learning<const N: usize>(
 ) -> std::io::Result<Learning> {
     let mut learner = Learner::<N>::new(config);
     let file = LearnedFile {
-        writer: BackgroundWriter::start("supple-rt-learned", WAITING)?,
+        writer: BackgroundWriter::start("supple-rt-learned", MAX_WAITING_FILES)?,
         description: Arc::new(description.clone()),
         folder: domain.learned_folder().into(),
     };
@@ -53,7 +53,7 @@ pub fn learning<const N: usize>(
     }))
 }
 
-/// The arm with what is learned, on the disk.
+/// Writes the description of the arm with the learned terms to the disk.
 struct LearnedFile {
     writer: BackgroundWriter,
     description: Arc<Description>,
@@ -61,7 +61,7 @@ struct LearnedFile {
 }
 
 impl LearnedFile {
-    /// Removes the TOML of an earlier system, so that nobody takes it for this one's.
+    /// Removes the TOML of an earlier run, so that it is not mistaken for the TOML of this run.
     fn remove(&self) {
         let file = self.folder.join("arm.toml");
         self.writer.submit(move || {
@@ -76,7 +76,7 @@ impl LearnedFile {
         });
     }
 
-    /// Hands the arm over; if the disk is behind, this one is left out, and the next follows.
+    /// Queues the description for the disk. If too many files wait, it is skipped; a later one replaces it.
     fn write<const N: usize>(&self, terms: LearnedTerms<N>, source: String) {
         let (description, folder) = (self.description.clone(), self.folder.clone());
         let save = move || -> Result<(), ModelError> {
@@ -85,7 +85,7 @@ impl LearnedFile {
         self.writer.submit(move || {
             if let Err(error) = save() {
                 diagnostics::post(format_args!(
-                    "supple-rt: warning: what is learned cannot be written: {error}"
+                    "supple-rt: warning: the learned terms cannot be written: {error}"
                 ));
             }
         });

@@ -16,12 +16,12 @@ const TELEMETRY: usize = 1024;
 const REQUESTS: usize = 16;
 const IDLE_REQUESTS: usize = 8;
 const REPLIES: usize = 64;
-/// What is learned: the requests of two estimates of the largest arm.
+/// Capacity for learned terms: the requests of two estimates of the largest arm.
 const LEARNED: usize = 32;
-/// At most one per cycle.
+/// Capacity for replies to idle requests; the loop sends at most one per cycle.
 const IDLE_REPLIES: usize = 64;
 
-/// The loop's ends of the queues.
+/// The loop's side of the queues.
 #[derive(Debug)]
 pub struct LoopQueues {
     pub(crate) telemetry: Producer<Telemetry>,
@@ -32,7 +32,7 @@ pub struct LoopQueues {
     pub(crate) states_dropped: Arc<AtomicU64>,
 }
 
-/// The helper's ends of the queues.
+/// The helper's side of the queues.
 #[derive(Debug)]
 pub struct HelperQueues {
     pub(crate) telemetry: Consumer<Telemetry>,
@@ -43,7 +43,7 @@ pub struct HelperQueues {
     pub(crate) states_dropped: Arc<AtomicU64>,
 }
 
-/// Creates all queues, empty.
+/// Creates all queues.
 pub fn loop_queues() -> (LoopQueues, HelperQueues) {
     let (telemetry_in, telemetry_out) = RingBuffer::new(TELEMETRY);
     let (requests_in, requests_out) = RingBuffer::new(REQUESTS + IDLE_REQUESTS);
@@ -75,7 +75,7 @@ impl LoopQueues {
         self.liveness.clone()
     }
 
-    /// The helper thread has ended: no requests can arrive any more.
+    /// Whether the helper thread has ended, so that no request can arrive any more.
     pub(crate) fn peer_dropped(&self) -> bool {
         self.telemetry.is_abandoned()
     }
@@ -87,12 +87,12 @@ impl HelperQueues {
         self.liveness.clone()
     }
 
-    /// Takes the oldest telemetry in the queue.
+    /// Removes and returns the oldest telemetry in the queue.
     pub fn telemetry(&mut self) -> Option<Telemetry> {
         self.telemetry.pop().ok()
     }
 
-    /// Takes the oldest reply in the queue.
+    /// Removes and returns the oldest reply in the queue.
     pub fn reply(&mut self) -> Option<OperatorReply> {
         self.replies.pop().ok()
     }
@@ -106,7 +106,7 @@ impl HelperQueues {
         self.requests.slots() > reserved && self.requests.push(request).is_ok()
     }
 
-    /// Queues what is learned, for its cycle; returns false if the queue is full, and it is lost.
+    /// Queues a request of the learner; returns false if the queue is full and the request is lost.
     pub fn learned(&mut self, request: OperatorRequest) -> bool {
         self.learned.push(request).is_ok()
     }
@@ -116,13 +116,13 @@ impl HelperQueues {
         self.states_dropped.load(Ordering::Relaxed)
     }
 
-    /// The loop has ended and its queues are empty.
+    /// Whether the loop has ended and its queues are empty.
     pub fn ended(&self) -> bool {
         self.telemetry.is_abandoned() && self.telemetry.is_empty() && self.replies.is_empty()
     }
 }
 
-/// The loop's end of the channel for idle requests.
+/// The loop's side of the channel for idle requests.
 #[derive(Debug)]
 pub struct LoopIdleChannel {
     last_request: Arc<AtomicU64>,
@@ -130,7 +130,7 @@ pub struct LoopIdleChannel {
     replies: Producer<OperatorReply>,
 }
 
-/// The idle-request thread's end of the channel.
+/// The side of the channel in the thread for idle requests.
 #[derive(Debug)]
 pub struct IdleThreadChannel {
     last_request: Arc<AtomicU64>,
@@ -154,7 +154,7 @@ pub fn idle_channel() -> (LoopIdleChannel, IdleThreadChannel) {
 }
 
 impl LoopIdleChannel {
-    /// Number of the last request, if it was not answered yet.
+    /// Returns the number of the last request, if it has not been answered.
     pub(crate) fn pending_request(&self) -> Option<u64> {
         let last_request = self.last_request.load(Ordering::Acquire);
         (last_request != self.answered).then_some(last_request)
@@ -168,24 +168,24 @@ impl LoopIdleChannel {
         }
     }
 
-    /// The idle-request thread has ended.
+    /// Whether the thread for idle requests has ended.
     pub(crate) fn peer_dropped(&self) -> bool {
         self.replies.is_abandoned()
     }
 }
 
 impl IdleThreadChannel {
-    /// Requests idle, with a request number one above the last.
+    /// Requests idle; `number` is one above the number of the last request.
     pub fn set_requested(&self, number: u64) {
         self.last_request.store(number, Ordering::Release);
     }
 
-    /// Takes the oldest reply in the queue.
+    /// Removes and returns the oldest reply in the queue.
     pub fn reply(&mut self) -> Option<OperatorReply> {
         self.replies.pop().ok()
     }
 
-    /// The loop has ended.
+    /// Whether the loop has ended.
     pub fn ended(&self) -> bool {
         self.replies.is_abandoned()
     }

@@ -1,9 +1,9 @@
 //! Queue of requests that wait for their cycle.
 //!
-//! Due requests are carried out in order of arrival, one per cycle; idle requests come first. When the arm goes to idle,
-//! a fault latches, or an operator asks for gravity hold or float at once, the requests that were queued before are
-//! refused, because they were sent under other conditions. One operator can use at most half of the queue, so it cannot block the others.
-//! Of an operator's set-points only the newest waits: it replaces an older one, which gets no reply.
+//! The loop executes due requests in order of arrival, one per cycle; idle requests come first. When the arm enters idle, a
+//! fault latches, or an operator requests gravity hold or float for the next cycle, the loop refuses all requests that were
+//! queued before, because they were sent under other conditions. One operator can use at most half of the queue, so that it
+//! cannot block the others. A new set-point of an operator replaces the older one in the queue, which gets no reply.
 
 use core::fmt;
 use supple_ipc::message::OperatorRequest;
@@ -13,7 +13,7 @@ pub const CAPACITY: usize = 16;
 /// Maximum number of queued requests of one operator.
 pub const CAPACITY_PER_OPERATOR: usize = 8;
 
-/// Why a request cannot be queued.
+/// Reason why a request cannot be queued.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum QueueFull {
     /// The queue is full.
@@ -28,13 +28,13 @@ impl fmt::Display for QueueFull {
             QueueFull::Full => f.write_str("too many requests are queued"),
             QueueFull::OperatorQuota => write!(
                 f,
-                "this operator has {CAPACITY_PER_OPERATOR} queued requests, the maximum"
+                "this operator has {CAPACITY_PER_OPERATOR} queued requests, which is the maximum"
             ),
         }
     }
 }
 
-/// Requests in order of arrival.
+/// Queue of requests in order of arrival.
 #[derive(Clone, Debug, Default)]
 pub struct RequestQueue {
     entries: [Option<OperatorRequest>; CAPACITY],
@@ -45,7 +45,7 @@ impl RequestQueue {
     /// Appends a request, or replaces an older set-point by a newer one.
     ///
     /// # Errors
-    /// [`QueueFull`].
+    /// [`QueueFull`] with the exhausted limit.
     pub fn push(&mut self, request: OperatorRequest) -> Result<(), QueueFull> {
         if request.is_set_point() && !request.is_scheduled() {
             let entries = self.entries[..self.length].iter_mut().flatten();
@@ -70,7 +70,7 @@ impl RequestQueue {
         Ok(())
     }
 
-    /// Removes and returns the first due request, with the number of those that arrived before it and are still queued;
+    /// Removes and returns the first due request, with the number of requests that arrived before it and are still queued. Due
     /// idle requests come first.
     pub fn pop_due(&mut self, cycle: u64) -> Option<(usize, OperatorRequest)> {
         let queued = self.entries[..self.length].iter().flatten();

@@ -6,7 +6,7 @@ use supple_ipc::message::CycleTiming;
 
 /// Upper bound of the histograms \[ns\]; longer times are clamped to it.
 const MAX_RECORDED_NS: u64 = 10_000_000_000;
-/// Significant decimal digits.
+/// Number of significant decimal digits of the histograms.
 const DIGITS: u8 = 3;
 
 /// Statistics of all cycles since the start.
@@ -31,10 +31,10 @@ pub struct Percentiles {
 }
 
 impl Timing {
-    /// Empty histograms; all memory is allocated here.
+    /// Creates empty histograms; allocates all memory.
     pub fn new() -> Timing {
         let histogram = Histogram::new_with_bounds(1, MAX_RECORDED_NS, DIGITS);
-        let histogram = histogram.expect("1 to 10^10 with 3 digits is a histogram");
+        let histogram = histogram.expect("the bounds and digits of the histogram are valid");
         Timing {
             cycles: 0,
             latency: histogram.clone(),
@@ -49,7 +49,7 @@ impl Timing {
         self.step.saturating_record(timing.step_ns);
     }
 
-    /// Cycles recorded.
+    /// Returns the number of recorded cycles.
     pub fn cycles(&self) -> u64 {
         self.cycles
     }

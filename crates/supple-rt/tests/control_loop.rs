@@ -1,5 +1,5 @@
-//! The loop against a scripted plant, on the real services: its answers equal those of `step`, it allocates nothing,
-//! requests take effect in their cycle, and on shutdown it sets the drives to idle.
+//! Tests of the control loop with a scripted plant on the shared-memory services: its answers equal those of `step`, it
+//! allocates no memory, requests take effect in their cycle, and on shutdown the drives become idle.
 
 #[path = "../../../tests/support/counting.rs"]
 mod counting;
@@ -49,12 +49,12 @@ fn announcements_do_not_change_the_answers() {
             if cycle == 3 {
                 bench.request(&Request::GravityHold, None);
             }
-            // The arm moves, so that a warm-up step that changed the state would show.
+            // The arm moves, so that a warm-up step that changes the state would change the answers.
             bench.home_rad[1] += 1e-4;
         }
         if cycle % 3 > 0 {
             announced.announce();
-            // All telemetry is sent then, and nothing twice: of the last step, and of one that was not announced.
+            // The announcement sends all telemetry once: of the last step, and of a step that was not announced.
             let sent = 1 + usize::from(cycle % 3 == 1 && cycle > 1);
             assert_eq!(announced.telemetry().len(), sent);
         }
@@ -77,9 +77,9 @@ fn a_thousand_cycles_with_requests_and_a_fault_allocate_nothing() {
             match k {
                 100 => bench.request(&Request::GravityHold, None),
                 200 => bench.request(&Request::Idle, Some(bench.cycle + 50)),
-                // Refused in idle: a text is written.
+                // A request that is refused in idle has a refusal text.
                 300 | 301 => bench.request(&Request::Reset, None),
-                // The channel for idle requests, and a state of another arm.
+                // The cycles use the channel for idle requests, and include a state of another arm.
                 400 => bench.idle().set_requested(1),
                 500 => {
                     let other = ArmState {
@@ -88,7 +88,7 @@ fn a_thousand_cycles_with_requests_and_a_fault_allocate_nothing() {
                     };
                     bench.plant.publish(&other).expect("published");
                 }
-                // Missing cycles: a fault with its text.
+                // Missing cycles cause a fault with its text.
                 900 => bench.cycle += 3,
                 _ => {}
             }
@@ -188,7 +188,7 @@ fn queued_requests_are_refused_on_idle_or_fault() {
     }
 }
 
-/// Who activates the drives again expects no motion that was scheduled before.
+/// An operator who activates the drives again does not expect a motion that was scheduled before.
 #[test]
 fn queued_motions_are_refused_when_the_drives_become_inactive() {
     let mut bench = Bench::new(true);
@@ -238,7 +238,7 @@ fn shutdown_ends_when_the_drives_are_idle() {
         assert!(!answer.wants_torque() && goes_on);
         assert_ne!(
             answer.torque_nm, [0.0; 7],
-            "it holds until the motors brake"
+            "the controller holds the arm until the motors brake"
         );
     }
     let (_, goes_on) = bench.cycle(Drives::Idle);

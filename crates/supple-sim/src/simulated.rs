@@ -15,8 +15,8 @@ use supple_can_frame::BitRates;
 use supple_core::Vector;
 use supple_core::controller::Mode;
 use supple_drive::{
-    Budget, Command, Drive, DriveCounters, DriveState, Drives, LoopError, LossReason, Lower,
-    Reading, Reserved, Rest, TipForce,
+    Budget, Command, Drive, DriveCounters, DriveState, Drives, LoopError, LossReason, LoweringMode,
+    Reading, ReservedTimes, TipForce, TorqueOffBehaviour,
 };
 use supple_plant::{
     ControllerView, Injection, InjectionError, Injector, Plant, Sample, TraceError, TraceFile,
@@ -196,12 +196,12 @@ impl<const N: usize> Drive<N> for SimulatedArm<N> {
         }
     }
 
-    fn rest(&self) -> Rest {
-        Rest::Brakes
+    fn torque_off_behaviour(&self) -> TorqueOffBehaviour {
+        TorqueOffBehaviour::Brakes
     }
 
-    fn reserved(&self) -> Reserved {
-        Reserved {
+    fn reserved(&self) -> ReservedTimes {
+        ReservedTimes {
             states_ns: 0,
             torques_ns: self.rest_ns,
         }
@@ -271,7 +271,7 @@ impl<const N: usize> Drive<N> for SimulatedArm<N> {
         Ok(())
     }
 
-    fn lower(&mut self, _: Lower, reason: LossReason) -> Result<(), LoopError> {
+    fn lower(&mut self, _: LoweringMode, reason: LossReason) -> Result<(), LoopError> {
         self.latched_idle |= self.active && reason != LossReason::TorqueNotWanted;
         self.active = false;
         Ok(())

@@ -1,44 +1,44 @@
-//! Commands of one viewer that await their answer. Nothing here waits: a connection goes on reading, so that idle and the
-//! emergency stop pass a command that the controller does not answer.
+//! Commands of one viewer that await their answer. This module never blocks: the connection continues to read, so that an
+//! unanswered command delays neither idle nor the emergency stop.
 
 use crate::command::Command;
-use crate::hub::{Answer, Hub, Pending};
+use crate::hub::{Answer, Hub, PendingCommand};
 use core::time::Duration;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 use std::time::Instant;
 use supple_ipc::{Domain, request_idle};
 
-/// How long a command waits for its answer.
+/// Timeout of an answer.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
-/// Most commands of each way that await their answer, for each viewer.
+/// Maximum number of commands on each path that await their answer, for each viewer.
 const MAX_WAITING: usize = 8;
 
-/// Who gets an answer.
+/// Recipient of an answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum ReplyTo {
-    /// A call of a service, by the ids of both.
+    /// A service call.
     Call {
-        /// The service.
+        /// Id of the service.
         service_id: u32,
-        /// The call.
+        /// Id of the call.
         call_id: u32,
     },
-    /// Parameters that were set, under the id of the message.
+    /// A message that set parameters, with its id.
     Parameters(Option<String>),
 }
 
-/// The way that a command takes; each has room of its own, so that none can take that of another.
+/// Path of a command. The number of pending commands is limited separately for each path, so that no path blocks another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Way {
+enum CommandPath {
     Idle,
     Pendant,
     Controller,
 }
 
-/// A command on its way.
+/// A command that awaits its answer.
 #[derive(Debug)]
-struct Waiting {
-    way: Way,
+struct PendingCall {
+    path: CommandPath,
     reply_to: ReplyTo,
     answer: Receiver<Answer>,
     since: Instant,
@@ -46,10 +46,10 @@ struct Waiting {
 
 /// The commands of a viewer that await their answer.
 #[derive(Debug, Default)]
-pub struct Calls(Vec<Waiting>);
+pub struct PendingCalls(Vec<PendingCall>);
 
-impl Calls {
-    /// Starts a command. Idle and the pendant run in threads of their own, everything else in the queue of the hub.
+impl PendingCalls {
+    /// Starts a command. Idle and pendant commands run in separate threads; all others go to the queue of the hub.
     pub fn start(
         &mut self,
         hub: &Hub,
@@ -59,39 +59,41 @@ impl Calls {
     ) {
         let (sender, answer) = channel();
         let domain = domain.filter(|_| hub.accepts_commands()).cloned();
-        let way = match (command, &domain) {
-            (Command::Idle, Some(_)) => Way::Idle,
-            (Command::Pendant { .. }, Some(_)) => Way::Pendant,
-            _ => Way::Controller,
+        let path = match (command, &domain) {
+            (Command::Idle, Some(_)) => CommandPath::Idle,
+            (Command::Pendant { .. }, Some(_)) => CommandPath::Pendant,
+            _ => CommandPath::Controller,
         };
-        let waiting = self.0.iter().filter(|waiting| waiting.way == way).count();
+        let waiting = self.0.iter().filter(|waiting| waiting.path == path).count();
         let outcome = match (command, domain) {
             _ if waiting >= MAX_WAITING => Err(format!(
-                "{MAX_WAITING} requests of this page still await their answer"
+                "{MAX_WAITING} requests of this page still await their answer: wait for it, or request idle"
             )),
-            (Command::Idle, Some(domain)) => aside(sender.clone(), move || idle(&domain)),
-            (Command::Pendant { button }, Some(domain)) => aside(sender.clone(), move || {
+            (Command::Idle, Some(domain)) => {
+                spawn(sender.clone(), move || request_idle_mode(&domain))
+            }
+            (Command::Pendant { button }, Some(domain)) => spawn(sender.clone(), move || {
                 crate::pendant::press(&domain, button.line()).map(|()| "pendant".to_owned())
             }),
-            (command, _) => hub.send_command(Pending {
+            (command, _) => hub.send_command(PendingCommand {
                 command,
                 answer: sender.clone(),
             }),
         };
         if let Err(reason) = outcome {
-            // The other end is below.
+            // The receiver is stored below, so sending succeeds.
             let _ = sender.send(Err(reason));
         }
-        self.0.push(Waiting {
-            way,
+        self.0.push(PendingCall {
+            path,
             reply_to,
             answer,
             since: Instant::now(),
         });
     }
 
-    /// Takes the answers that have come; a command without one for too long gets that as its answer.
-    pub fn answered(&mut self) -> Vec<(ReplyTo, Answer)> {
+    /// Removes and returns the answers that have arrived; a command whose answer timed out gets an error as its answer.
+    pub fn take_answers(&mut self) -> Vec<(ReplyTo, Answer)> {
         let mut done = Vec::new();
         self.0.retain(|waiting| {
             let answer = match waiting.answer.try_recv() {
@@ -108,21 +110,21 @@ impl Calls {
     }
 }
 
-/// Runs something that waits in a thread of its own.
-fn aside(
+/// Runs blocking work in a separate thread.
+fn spawn(
     answer: Sender<Answer>,
     work: impl FnOnce() -> Answer + Send + 'static,
 ) -> Result<(), String> {
     let thread = std::thread::Builder::new().name("request".to_owned());
     let started = thread.spawn(move || {
-        // The viewer may have gone.
+        // The viewer may have disconnected.
         let _ = answer.send(work());
     });
     started.map(drop).map_err(|error| error.to_string())
 }
 
-/// Idle has a way of its own, which no other client can block.
-fn idle(domain: &Domain) -> Answer {
+/// Requests idle through the separate socket for idle requests, which no other client can block.
+fn request_idle_mode(domain: &Domain) -> Answer {
     match request_idle(domain, ANSWER_TIMEOUT) {
         Ok(Some(answer)) => match answer.outcome {
             supple_ipc::message::Outcome::Refused => Err(answer.text),
@@ -138,10 +140,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_command_without_an_answer_holds_up_no_other_and_room_is_bounded() {
+    fn an_unanswered_command_blocks_no_other_and_pending_commands_are_limited() {
         let hub = Hub::new(Vec::new());
         let commands = hub.accept_commands();
-        let mut calls = Calls::default();
+        let mut calls = PendingCalls::default();
         let call = |call| ReplyTo::Call {
             service_id: 1,
             call_id: call,
@@ -149,7 +151,7 @@ mod tests {
         for number in 0..=MAX_WAITING as u32 {
             calls.start(&hub, None, Command::Reset, call(number));
         }
-        let refused = calls.answered();
+        let refused = calls.take_answers();
         assert_eq!(refused.len(), 1);
         assert_eq!(refused[0].0, call(MAX_WAITING as u32));
         assert!(
@@ -160,12 +162,12 @@ mod tests {
         );
         let taken: Vec<_> = commands.try_iter().collect();
         assert_eq!(taken.len(), MAX_WAITING);
-        // Answers come in any order.
+        // Answers arrive in any order.
         taken[3]
             .answer
             .send(Ok("track".to_owned()))
             .expect("awaited");
-        assert_eq!(calls.answered(), [(call(3), Ok("track".to_owned()))]);
-        assert_eq!(calls.answered(), []);
+        assert_eq!(calls.take_answers(), [(call(3), Ok("track".to_owned()))]);
+        assert_eq!(calls.take_answers(), []);
     }
 }

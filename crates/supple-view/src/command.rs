@@ -1,5 +1,5 @@
-//! What the page and other viewers may ask of the arm. Each becomes a request that the controller checks, or a press of
-//! a button of the emulated pendant.
+//! Commands that the page and other viewers may send. A command becomes a request that the controller checks, or a button
+//! press on the emulated pendant.
 
 use crate::snapshot::Snapshot;
 use serde::Deserialize;
@@ -8,20 +8,20 @@ use supple_core::config::Gains;
 use supple_core::controller::{CycleRecord, Request};
 use supple_core::math::Vector3;
 
-/// Ramp of new gains without a time of its own \[s\].
+/// Default duration of the ramp to new gains \[s\].
 const RAMP_S: f64 = 0.5;
-/// Time for which compliant joints come to rest where they are \[s\].
+/// Duration of the move with which compliant joints stop at the present pose \[s\].
 const COMPLY_S: f64 = 0.5;
 
-/// A command, as the service `/request` takes it in JSON.
+/// A command, as the service `/request` accepts it in JSON.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq)]
 #[serde(tag = "request", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Command {
-    /// No torque; needs no place in a queue.
+    /// Idle: no torque. It uses no queue.
     Idle,
-    /// The model holds the arm's weight.
+    /// Gravity hold.
     GravityHold,
-    /// The model alone, for guiding by hand.
+    /// Float, for guiding the arm by hand.
     Float,
     /// Compliant joints at the present pose.
     JointImpedance,
@@ -29,13 +29,13 @@ pub enum Command {
     HoldTip,
     /// Clears the latched fault.
     Reset,
-    /// Changes gains; what is absent stays.
+    /// Changes gains; an absent gain stays as it is.
     Gains {
-        /// \[N/m\].
+        /// Stiffness for x, y, z \[N/m\].
         stiffness_n_per_m: Option<[f64; 3]>,
-        /// \[N s/m\].
+        /// Damping for x, y, z \[N s/m\].
         damping_n_s_per_m: Option<[f64; 3]>,
-        /// \[s\].
+        /// Duration of the ramp to the new gains \[s\].
         ramp_s: Option<f64>,
     },
     /// Presses a button of the emulated pendant.
@@ -49,9 +49,9 @@ pub enum Command {
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "kebab-case")]
 pub enum Button {
-    /// The emergency stop.
+    /// Presses the emergency stop.
     EStop,
-    /// Releases it.
+    /// Releases the emergency stop.
     Release,
     /// Shift-Idle.
     Idle,
@@ -60,7 +60,7 @@ pub enum Button {
 }
 
 impl Button {
-    /// The line that the pendant takes.
+    /// Returns the line that the socket of the pendant accepts.
     pub fn line(self) -> &'static str {
         match self {
             Button::EStop => "e-stop",
@@ -79,16 +79,16 @@ pub const SCHEMA: &str = r#"{"type":"object","required":["request"],"properties"
 "ramp_s":{"type":"number"},"button":{"enum":["e-stop","release","idle","activate"]}}}"#;
 
 impl Command {
-    /// Reads a command.
+    /// Parses a command.
     ///
     /// # Errors
-    /// Why it is none.
+    /// The reason why the JSON is not a command.
     pub fn parse(json: &[u8]) -> Result<Command, String> {
         serde_json::from_slice(json).map_err(|error| format!("the request is invalid: {error}"))
     }
 
-    /// The request to the controller in the state of the latest cycle; `None` for idle and the pendant, which go
-    /// other ways.
+    /// Returns the request to the controller, given the latest cycle; `None` for idle and pendant commands, which do not go
+    /// through the controller's queue.
     pub fn request<const N: usize>(&self, now: &CycleRecord<N>) -> Option<Request<N>> {
         Some(match *self {
             Command::Idle | Command::Pendant { .. } => return None,
@@ -122,7 +122,7 @@ impl Command {
 /// Names of the parameters of the Foxglove protocol.
 pub const PARAMETERS: [&str; 2] = ["stiffness_n_per_m", "damping_n_s_per_m"];
 
-/// The value of a parameter.
+/// Returns the value of a parameter.
 pub fn parameter(snapshot: &Snapshot, name: &str) -> Option<[f32; 3]> {
     match PARAMETERS.iter().position(|known| *known == name)? {
         0 => Some(snapshot.stiffness_n_per_m),
@@ -130,10 +130,10 @@ pub fn parameter(snapshot: &Snapshot, name: &str) -> Option<[f32; 3]> {
     }
 }
 
-/// The command that sets parameters: a number for all axes, or three.
+/// Creates the command that sets parameters; a value is one number for all axes, or three numbers.
 ///
 /// # Errors
-/// Which parameter or value is invalid.
+/// The invalid parameter or value.
 pub fn set_parameters(values: &[(String, serde_json::Value)]) -> Result<Command, String> {
     let (mut stiffness_n_per_m, mut damping_n_s_per_m) = (None, None);
     for (name, value) in values {
@@ -146,14 +146,18 @@ pub fn set_parameters(values: &[(String, serde_json::Value)]) -> Result<Command,
             [Some(x), Some(y), Some(z)] => [x, y, z],
             _ => {
                 return Err(format!(
-                    "{name} is {value}: give a number, or three for x, y, z"
+                    "{name} is {value}: give one number, or three numbers for x, y, z"
                 ));
             }
         };
         match PARAMETERS.iter().position(|known| known == name) {
             Some(0) => stiffness_n_per_m = Some(axes),
             Some(_) => damping_n_s_per_m = Some(axes),
-            None => return Err(format!("{name} is no parameter that can be set")),
+            None => {
+                return Err(format!(
+                    "the parameter {name} cannot be set: use stiffness_n_per_m or damping_n_s_per_m"
+                ));
+            }
         }
     }
     Ok(Command::Gains {
@@ -169,7 +173,7 @@ mod tests {
     use serde_json::json;
 
     #[test]
-    fn commands_are_read_strictly() {
+    fn unknown_commands_and_fields_are_rejected() {
         let parse = |text: &str| Command::parse(text.as_bytes());
         assert_eq!(parse(r#"{"request":"reset"}"#), Ok(Command::Reset));
         let pressed = Command::Pendant {
@@ -193,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parameter_is_one_number_or_three_and_the_rest_stays() {
+    fn a_parameter_is_one_number_or_three_and_others_stay_unset() {
         let set = |name: &str, value| set_parameters(&[(name.to_owned(), value)]);
         let stiffness = |axes| {
             Ok(Command::Gains {

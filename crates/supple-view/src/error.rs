@@ -1,11 +1,11 @@
-//! Why the page cannot be served.
+//! Errors of serving the page.
 
 use std::io;
 use supple_ipc::IpcError;
 use supple_log::LogError;
 use supple_model::ModelError;
 
-/// Why the page cannot be served.
+/// Error: the page cannot be served.
 #[derive(Debug, thiserror::Error)]
 pub enum ViewError {
     /// The arm's description is invalid.
@@ -17,9 +17,9 @@ pub enum ViewError {
     /// The system cannot be joined.
     #[error(transparent)]
     Ipc(#[from] IpcError),
-    /// The port cannot be opened, or the kernel gives no random numbers or thread for it.
+    /// The port cannot be opened, or the kernel provides no random numbers or thread for the server.
     #[error(
-        "cannot listen on 127.0.0.1:{port}: {error}; give another --port, or none for a free one"
+        "cannot listen on 127.0.0.1:{port}: {error}; give another port with --port, or omit --port for a free one"
     )]
     Listen {
         /// The port; 0 for a free one.
@@ -27,7 +27,7 @@ pub enum ViewError {
         /// Error of the operating system.
         error: io::Error,
     },
-    /// A snapshot cannot be represented as JSON, a bug.
+    /// A snapshot cannot be represented as JSON; this is a bug.
     #[error("a snapshot cannot be encoded: {0}")]
     Encode(#[from] serde_json::Error),
 }

@@ -1,42 +1,42 @@
-//! Requests of a browser: their heads, who may ask, and the answers.
+//! HTTP requests of a browser: parses their heads, checks access, and writes responses.
 //!
-//! Three checks apply to every request. The URL has the token. `Host` is this server, so that a name of another site
-//! that resolves to 127.0.0.1 (DNS rebinding) is of no use. `Origin`, which a browser always sends with a WebSocket, is
-//! this page or one that the user allowed.
+//! Three checks apply to every request. The URL must contain the token. `Host` must be this server, so that a name of
+//! another site that resolves to 127.0.0.1 (DNS rebinding) is rejected. `Origin`, which a browser always sends with a
+//! WebSocket, must be this page or an origin that the user allowed.
 
 use crate::token::Token;
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// Time within which a whole head must arrive.
+/// Timeout for receiving a complete head.
 const HEAD_TIMEOUT: Duration = Duration::from_secs(5);
-/// Greatest length of a request's head.
+/// Maximum length of a request's head \[bytes\].
 const MAX_HEAD_BYTES: usize = 8192;
-/// Greatest number of its headers.
+/// Maximum number of headers of a request.
 const MAX_HEADERS: usize = 64;
-/// Origins of a viewer that is an installed program.
+/// Origin of a viewer that is an installed program.
 const PROGRAM_ORIGIN: &str = "file://";
 
 /// The head of a request.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Head {
+pub struct RequestHead {
     /// Method, such as `GET`.
     pub method: String,
     /// Path with the query.
     pub path: String,
     /// Names in lower case, with their values.
     headers: Vec<(String, String)>,
-    /// What follows the head.
+    /// Data after the head.
     pub rest: Vec<u8>,
 }
 
-impl Head {
-    /// Reads a head; `None` if the peer sends none that is valid.
+impl RequestHead {
+    /// Reads a head; returns `None` if the peer does not send a valid one.
     ///
     /// # Errors
-    /// Of the connection.
-    pub fn read(stream: &mut TcpStream) -> io::Result<Option<Head>> {
+    /// If the connection fails.
+    pub fn read(stream: &mut TcpStream) -> io::Result<Option<RequestHead>> {
         let mut bytes = Vec::new();
         let mut part = [0; 2048];
         let start = Instant::now();
@@ -51,7 +51,7 @@ impl Head {
                 return Ok(None);
             }
             bytes.extend_from_slice(&part[..count]);
-            match Head::parse(&bytes) {
+            match RequestHead::parse(&bytes) {
                 Ok(None) => {}
                 parsed => return Ok(parsed.ok().flatten()),
             }
@@ -59,11 +59,11 @@ impl Head {
         Ok(None)
     }
 
-    /// Parses a head; `None` if it is not complete yet.
+    /// Parses a head; returns `None` if it is not complete yet.
     ///
     /// # Errors
-    /// Why it is not valid.
-    pub fn parse(bytes: &[u8]) -> Result<Option<Head>, httparse::Error> {
+    /// The reason why the head is not valid.
+    pub fn parse(bytes: &[u8]) -> Result<Option<RequestHead>, httparse::Error> {
         let mut headers = [httparse::EMPTY_HEADER; MAX_HEADERS];
         let mut request = httparse::Request::new(&mut headers);
         let length = match request.parse(bytes)? {
@@ -74,7 +74,7 @@ impl Head {
             let value = String::from_utf8_lossy(header.value).trim().to_owned();
             (header.name.to_ascii_lowercase(), value)
         };
-        Ok(Some(Head {
+        Ok(Some(RequestHead {
             method: request.method.unwrap_or_default().to_owned(),
             path: request.path.unwrap_or_default().to_owned(),
             headers: request.headers.iter().map(header).collect(),
@@ -82,7 +82,7 @@ impl Head {
         }))
     }
 
-    /// Value of a header that is there once; its name in lower case.
+    /// Returns the value of a header that occurs once; `name` is in lower case.
     pub fn header(&self, name: &str) -> Option<&str> {
         let mut values = self.headers.iter().filter(|(found, _)| found == name);
         let (_, value) = values.next()?;
@@ -94,23 +94,23 @@ impl Head {
     }
 }
 
-/// Who may ask.
-pub struct Gate {
+/// Access check of requests.
+pub struct AccessCheck {
     token: Token,
     port: u16,
     origins: Vec<String>,
 }
 
-/// Why a request is answered with an error.
+/// Reason why a request is rejected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rejected {
-    /// Not a GET.
+    /// The method is not GET.
     Method,
-    /// Without the token.
+    /// The URL lacks the token.
     Token,
-    /// To a name that is not this server's.
+    /// `Host` is not this server.
     Host,
-    /// From the page of another site.
+    /// `Origin` is the page of another site.
     Origin,
 }
 
@@ -118,46 +118,52 @@ impl Rejected {
     /// Status line and explanation.
     pub fn answer(self) -> (&'static str, &'static str) {
         match self {
-            Rejected::Method => ("405 Method Not Allowed", "Only GET.\n"),
+            Rejected::Method => (
+                "405 Method Not Allowed",
+                "Only the method GET is allowed.\n",
+            ),
             Rejected::Token => (
                 "403 Forbidden",
-                "The URL lacks its token: open the one that supple printed.\n",
+                "The URL lacks its token: open the URL that supple printed.\n",
             ),
-            Rejected::Host => ("403 Forbidden", "Use 127.0.0.1 or localhost.\n"),
+            Rejected::Host => (
+                "403 Forbidden",
+                "The host is not this server: use 127.0.0.1 or localhost.\n",
+            ),
             Rejected::Origin => (
                 "403 Forbidden",
-                "This origin is not allowed: start the viewer with --allow-origin.\n",
+                "This origin is not allowed: start supple with --allow-origin ORIGIN.\n",
             ),
         }
     }
 }
 
-impl Gate {
-    /// For a server on this port of the loopback interface.
-    pub fn new(token: Token, port: u16, origins: &[String]) -> Gate {
+impl AccessCheck {
+    /// Creates the check for a server on this port of the loopback interface.
+    pub fn new(token: Token, port: u16, origins: &[String]) -> AccessCheck {
         let origins = origins.iter().map(|o| o.trim_end_matches('/').to_owned());
-        Gate {
+        AccessCheck {
             token,
             port,
             origins: origins.collect(),
         }
     }
 
-    /// Address of the page.
+    /// Returns the URL of the page.
     pub fn url(&self) -> String {
         format!("http://127.0.0.1:{}/{}/", self.port, self.token.as_str())
     }
 
-    /// Address for viewers of the Foxglove protocol.
+    /// Returns the URL for viewers of the Foxglove protocol.
     pub fn websocket_url(&self) -> String {
         format!("ws://127.0.0.1:{}/{}/ws", self.port, self.token.as_str())
     }
 
-    /// The path after the token.
+    /// Checks a request; returns the path after the token.
     ///
     /// # Errors
-    /// [`Rejected`].
-    pub fn check<'a>(&self, head: &'a Head) -> Result<&'a str, Rejected> {
+    /// [`Rejected`] with the reason.
+    pub fn check<'a>(&self, head: &'a RequestHead) -> Result<&'a str, Rejected> {
         if head.method != "GET" {
             return Err(Rejected::Method);
         }
@@ -186,17 +192,17 @@ impl Gate {
     }
 }
 
-/// Writes an answer and ends the connection.
+/// Writes a response and closes the connection.
 ///
 /// # Errors
-/// Of the connection.
+/// If the connection fails.
 pub fn respond(
     stream: &mut TcpStream,
     status: &str,
     media_type: &str,
     body: &[u8],
 ) -> io::Result<()> {
-    // The policy allows what comes from this server and nothing else; no other site may show the page in a frame.
+    // The policy allows content from this server only, and no other site may show the page in a frame.
     write!(
         stream,
         "HTTP/1.1 {status}\r\nContent-Type: {media_type}\r\nContent-Length: {}\r\nConnection: close\r\n\
@@ -214,25 +220,25 @@ pub fn respond(
 mod tests {
     use super::*;
 
-    fn gate() -> (Gate, String) {
+    fn access() -> (AccessCheck, String) {
         let token = Token::new().expect("random numbers");
         let text = token.as_str().to_owned();
         let allowed = ["http://localhost:8080/".to_owned()];
-        (Gate::new(token, 4000, &allowed), text)
+        (AccessCheck::new(token, 4000, &allowed), text)
     }
 
-    fn head(method: &str, path: &str, headers: &str) -> Head {
+    fn head(method: &str, path: &str, headers: &str) -> RequestHead {
         let text = format!("{method} {path} HTTP/1.1\r\n{headers}\r\n");
-        let parsed = Head::parse(text.as_bytes()).expect("valid");
+        let parsed = RequestHead::parse(text.as_bytes()).expect("valid");
         parsed.expect("complete")
     }
 
     #[test]
-    fn the_token_opens_the_page_to_its_own_host_and_origin_alone() {
-        let (gate, token) = gate();
+    fn only_requests_with_token_and_own_host_and_origin_are_accepted() {
+        let (access, token) = access();
         let check = |path: &str, headers: &str| {
             let head = head("GET", path, headers);
-            gate.check(&head).map(str::to_owned)
+            access.check(&head).map(str::to_owned)
         };
         let own = "Host: 127.0.0.1:4000\r\n";
         assert_eq!(check(&format!("/{token}/"), own), Ok(String::new()));
@@ -274,17 +280,20 @@ mod tests {
             };
             assert_eq!(checked, expected, "{origin}");
         }
-        assert_eq!(gate.check(&head("POST", &path, own)), Err(Rejected::Method));
+        assert_eq!(
+            access.check(&head("POST", &path, own)),
+            Err(Rejected::Method)
+        );
     }
 
     #[test]
-    fn a_head_that_is_cut_is_incomplete_and_other_bytes_are_rejected() {
+    fn a_truncated_head_is_incomplete_and_invalid_bytes_are_rejected() {
         let whole = b"GET / HTTP/1.1\r\nHost: a\r\n\r\nrest";
-        let parsed = Head::parse(whole).expect("valid").expect("complete");
+        let parsed = RequestHead::parse(whole).expect("valid").expect("complete");
         assert_eq!(parsed.rest, b"rest");
         for end in 0..whole.len() - 4 {
-            assert_eq!(Head::parse(&whole[..end]), Ok(None), "{end}");
+            assert_eq!(RequestHead::parse(&whole[..end]), Ok(None), "{end}");
         }
-        assert!(Head::parse(b"\x00\x01\x02").is_err());
+        assert!(RequestHead::parse(b"\x00\x01\x02").is_err());
     }
 }

@@ -1,6 +1,6 @@
-//! What the threads share: the viewers that are connected, the latest snapshot, and commands on their way.
+//! State shared by the threads: the connected viewers, the latest snapshot, and the queue of commands.
 //!
-//! A viewer has a queue of bounded length. If it is slow its oldest messages are dropped; nobody waits for it.
+//! Each viewer has a queue of bounded length. If a viewer is slow, its oldest messages are dropped; no thread waits for it.
 
 use crate::command::Command;
 use crate::protocol::{Channel, message_data};
@@ -9,25 +9,25 @@ use std::collections::{BTreeMap, VecDeque};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Most messages that wait for a viewer.
+/// Maximum number of messages that wait for a viewer.
 const QUEUE_LENGTH: usize = 64;
 
-/// The answer to a command: the mode afterwards, or why it was refused.
+/// Answer to a command: the mode after it, or the reason why it was refused.
 pub type Answer = Result<String, String>;
 
-/// A command with the way back of its answer.
+/// A command with the channel for its answer.
 #[derive(Debug)]
-pub struct Pending {
+pub struct PendingCommand {
     /// The command.
     pub command: Command,
-    /// Takes the answer.
+    /// Channel for the answer.
     pub answer: Sender<Answer>,
 }
 
 /// A connected viewer.
 #[derive(Debug, Default)]
 pub struct Viewer {
-    /// Subscription of each channel.
+    /// Id of the subscription of each channel.
     subscriptions: Mutex<BTreeMap<u32, u32>>,
     queue: Mutex<VecDeque<Vec<u8>>>,
 }
@@ -43,12 +43,12 @@ impl Viewer {
         lock(&self.subscriptions).retain(|_, id| *id != subscription);
     }
 
-    /// The oldest message that waits.
+    /// Removes and returns the oldest waiting message.
     pub fn next(&self) -> Option<Vec<u8>> {
         lock(&self.queue).pop_front()
     }
 
-    /// Sends a message on a channel, if it is subscribed to.
+    /// Queues a message on a channel, if the viewer has subscribed to the channel.
     pub fn send(&self, channel: u32, time_ns: u64, payload: &[u8]) {
         let Some(subscription) = lock(&self.subscriptions).get(&channel).copied() else {
             return;
@@ -65,19 +65,19 @@ impl Viewer {
     }
 }
 
-/// What the threads share.
+/// State shared by the threads.
 #[derive(Debug)]
 pub struct Hub {
     channels: Vec<Channel>,
     viewers: Mutex<BTreeMap<u64, Arc<Viewer>>>,
     latest: Mutex<Option<Snapshot>>,
-    /// Messages that a channel repeats to each new subscriber, such as the arm's description.
+    /// Messages that each new subscriber of a channel receives, such as the arm's description.
     retained: Mutex<BTreeMap<u32, Vec<u8>>>,
-    commands: Mutex<Option<Sender<Pending>>>,
+    commands: Mutex<Option<Sender<PendingCommand>>>,
 }
 
 impl Hub {
-    /// For these channels.
+    /// Creates the hub for these channels.
     pub fn new(channels: Vec<Channel>) -> Hub {
         Hub {
             channels,
@@ -88,13 +88,13 @@ impl Hub {
         }
     }
 
-    /// The channels; the id of each is its index.
+    /// Returns the channels; the id of a channel is its index.
     pub fn channels(&self) -> &[Channel] {
         &self.channels
     }
 
-    /// Accepts commands from now on; they arrive at the returned end.
-    pub fn accept_commands(&self) -> Receiver<Pending> {
+    /// Begins to accept commands, which arrive at the returned receiver.
+    pub fn accept_commands(&self) -> Receiver<PendingCommand> {
         let (sender, receiver) = channel();
         *lock(&self.commands) = Some(sender);
         receiver
@@ -105,20 +105,22 @@ impl Hub {
         lock(&self.commands).is_some()
     }
 
-    /// Passes a command on.
+    /// Queues a command.
     ///
     /// # Errors
     /// If no commands are accepted.
-    pub fn send_command(&self, pending: Pending) -> Result<(), String> {
+    pub fn send_command(&self, pending: PendingCommand) -> Result<(), String> {
         let commands = lock(&self.commands);
         let sent = commands.as_ref().map(|commands| commands.send(pending));
         match sent {
             Some(Ok(())) => Ok(()),
-            _ => Err("this page only shows: it is a log, or was started with --read-only".into()),
+            _ => Err(
+                "this page only shows data: it shows a log, or was started with --read-only".into(),
+            ),
         }
     }
 
-    /// Adds a viewer under an id that no other has.
+    /// Adds a viewer with a unique id.
     pub fn join(&self, id: u64) -> Arc<Viewer> {
         let viewer = Arc::new(Viewer::default());
         lock(&self.viewers).insert(id, viewer.clone());
@@ -137,19 +139,19 @@ impl Hub {
         viewers.values().any(wants)
     }
 
-    /// Sends a message on a channel to those who subscribed to it.
+    /// Sends a message on a channel to all its subscribers.
     pub fn publish(&self, channel: u32, time_ns: u64, payload: &[u8]) {
         for viewer in lock(&self.viewers).values() {
             viewer.send(channel, time_ns, payload);
         }
     }
 
-    /// Keeps a message that each new subscriber of the channel receives.
+    /// Stores a message that each new subscriber of the channel receives.
     pub fn retain(&self, channel: u32, payload: Vec<u8>) {
         lock(&self.retained).insert(channel, payload);
     }
 
-    /// Subscribes a viewer and sends what the channel repeats.
+    /// Subscribes a viewer and sends it the stored message of the channel.
     pub fn subscribe(&self, viewer: &Viewer, subscription: u32, channel: u32) {
         viewer.subscribe(subscription, channel);
         if let Some(payload) = lock(&self.retained).get(&channel) {
@@ -157,18 +159,18 @@ impl Hub {
         }
     }
 
-    /// The latest snapshot.
+    /// Returns the latest snapshot.
     pub fn latest(&self) -> Option<Snapshot> {
         lock(&self.latest).clone()
     }
 
-    /// Replaces it.
+    /// Replaces the latest snapshot.
     pub fn set_latest(&self, snapshot: Snapshot) {
         *lock(&self.latest) = Some(snapshot);
     }
 }
 
-/// A lock whose holder panicked is as good as any other: every value in it is complete.
+/// Locks a mutex. A mutex whose holder panicked can be used, because every value in it is complete.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -178,7 +180,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_viewer_that_does_not_read_loses_the_oldest_and_costs_a_bounded_queue() {
+    fn a_viewer_that_does_not_read_loses_the_oldest_messages_of_a_bounded_queue() {
         let hub = Hub::new(Vec::new());
         let (slow, other) = (hub.join(1), hub.join(2));
         hub.subscribe(&slow, 7, 0);
@@ -192,11 +194,11 @@ mod tests {
         assert_eq!(received.len(), QUEUE_LENGTH);
         let newest = message_data(7, 999, b"x");
         assert_eq!(received.last(), Some(&newest));
-        assert_eq!(other.next(), None, "it has not subscribed");
+        assert_eq!(other.next(), None, "the other viewer has not subscribed");
     }
 
     #[test]
-    fn what_a_channel_retains_reaches_whoever_subscribes_later() {
+    fn a_retained_message_reaches_later_subscribers() {
         let hub = Hub::new(Vec::new());
         hub.retain(3, b"urdf".to_vec());
         let viewer = hub.join(1);
@@ -210,7 +212,7 @@ mod tests {
     #[test]
     fn commands_are_refused_until_they_are_accepted() {
         let hub = Hub::new(Vec::new());
-        let pending = || Pending {
+        let pending = || PendingCommand {
             command: Command::Reset,
             answer: channel().0,
         };

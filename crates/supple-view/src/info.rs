@@ -1,4 +1,4 @@
-//! What the page must receive before the first snapshot, as JSON.
+//! Data that the page must receive before the first snapshot, as JSON.
 
 use crate::error::ViewError;
 use crate::protocol::Channel;
@@ -7,8 +7,8 @@ use supple_core::torques::TERMS;
 use supple_log::LiveEncoder;
 use supple_model::{Description, with_dof};
 
-/// What is shown, and how.
-pub struct Subject<'a> {
+/// Content of the page and its options.
+pub struct PageContent<'a> {
     /// The arm.
     pub description: &'a Description,
     /// Title.
@@ -17,25 +17,25 @@ pub struct Subject<'a> {
     pub log: Option<Value>,
     /// Height of the top face of a block \[m\].
     pub block_m: Option<f64>,
-    /// The page offers commands.
+    /// Whether the page offers commands.
     pub commands: bool,
-    /// The system has an emulated pendant.
+    /// Whether the system has an emulated pendant.
     pub pendant: bool,
 }
 
-/// The page's description.
+/// Encodes the page's description as JSON.
 ///
 /// # Errors
 /// [`ViewError::Model`] if the arm's configuration is invalid.
-pub fn info(subject: &Subject<'_>) -> Result<Vec<u8>, ViewError> {
-    let description = subject.description;
+pub fn info(content: &PageContent<'_>) -> Result<Vec<u8>, ViewError> {
+    let description = content.description;
     let limits = with_dof!(description.dof(), N => description.config::<N>().map(|config| {
         (config.limits.stiffness_n_per_m, config.limits.damping_n_s_per_m, config.period_s)
     }))??;
     let (stiffness, damping, period_s) = limits;
     let terms: Vec<&str> = TERMS.iter().map(|term| term.name).collect();
     let info = json!({
-        "title": subject.title,
+        "title": content.title,
         "version": env!("CARGO_PKG_VERSION"),
         "arm": description.name(),
         "joints": description.joint_names(),
@@ -46,18 +46,18 @@ pub fn info(subject: &Subject<'_>) -> Result<Vec<u8>, ViewError> {
         "max_stiffness_n_per_m": stiffness,
         "max_damping_n_s_per_m": damping,
         "terms": terms,
-        "block_m": subject.block_m,
-        "commands": subject.commands,
-        "pendant": subject.pendant,
-        "log": subject.log,
+        "block_m": content.block_m,
+        "commands": content.commands,
+        "pendant": content.pendant,
+        "log": content.log,
     });
     Ok(info.to_string().into_bytes())
 }
 
-/// The channels of a running system: the snapshots, and those of a log.
+/// Returns the channels of a running system: the channel of snapshots, and the channels of a log.
 ///
 /// # Errors
-/// [`ViewError::Log`].
+/// [`ViewError::Log`] if the arm's configuration is invalid.
 pub fn channels(description: &Description) -> Result<Vec<Channel>, ViewError> {
     let of_log = with_dof!(description.dof(), N => LiveEncoder::<N>::channels())??;
     let of_log = of_log.into_iter().map(|channel| Channel {

@@ -1,11 +1,11 @@
 //! The live page of a running system or of a log, and a server of the Foxglove WebSocket protocol.
 //!
-//! A process of its own, which `supple view` and `supple up --view` start: it reads telemetry like any other client and
-//! sends requests like any other operator. It runs at a lower priority (nice 10), polls shared memory and never makes the
-//! controller wait; without it, or with a browser that hangs, the loop is the same.
+//! The page is served by a separate process, which `supple view` and `supple up --view` start. It reads telemetry like any
+//! other client and sends requests like any other operator. It runs at a lower priority (nice 10), polls shared memory and
+//! never makes the controller wait; a browser that hangs has no effect on the control loop.
 //!
-//! The page is embedded and asks no other server for anything. Everything is served on 127.0.0.1 alone, and only to
-//! those who have the token in the URL (`http.rs`).
+//! The page is embedded in the program and loads nothing from other servers. The server listens on 127.0.0.1 only, and
+//! accepts only requests with the token in the URL (`http.rs`).
 //!
 //! ```text
 //!  telemetry --> live (one thread) --> hub --> viewer (a thread each) --> browser, Lichtblick
@@ -33,11 +33,11 @@ mod viewer;
 
 pub use error::ViewError;
 
-use http::Gate;
+use http::AccessCheck;
 use hub::Hub;
 use live::LiveConnection;
 use serde::Serialize;
-use server::Shown;
+use server::ServedContent;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
@@ -48,24 +48,24 @@ use token::Token;
 
 /// Increment of the niceness of the process.
 const NICENESS: i32 = 10;
-/// Time between two looks for a shutdown.
+/// Interval at which a shutdown request is checked.
 const POLL_INTERVAL: core::time::Duration = core::time::Duration::from_millis(20);
 
-/// What to show.
+/// Source of the data to show.
 #[derive(Clone, Debug)]
 pub enum Source {
     /// A running system.
     System {
-        /// Its namespace.
+        /// Namespace of the system.
         domain: Box<Domain>,
-        /// Its arm.
+        /// Description of the arm.
         description: Box<Description>,
     },
     /// A log.
     Log(PathBuf),
 }
 
-/// How to show it.
+/// Options of the page.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// Draw a block with its top face at this height \[m\].
@@ -78,19 +78,19 @@ pub struct Options {
     pub allow_origin: Vec<String>,
 }
 
-/// Where the page is. Both addresses contain the token.
+/// URLs of the page. Both contain the token.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Addresses {
-    /// The page.
+    /// URL of the page.
     pub url: String,
-    /// For viewers of the Foxglove protocol.
+    /// URL for viewers of the Foxglove protocol.
     pub foxglove_url: String,
 }
 
-/// Serves the page until a shutdown is requested; `announce` receives its addresses once it can be opened.
+/// Serves the page until a shutdown is requested; `announce` receives its URLs once it can be opened.
 ///
 /// # Errors
-/// [`ViewError`].
+/// [`ViewError`] with the reason why the page cannot be served.
 pub fn run(
     source: &Source,
     options: &Options,
@@ -116,10 +116,10 @@ pub fn run(
     }
 }
 
-fn shown_log(log: &std::path::Path, options: &Options) -> Result<Shown, ViewError> {
+fn shown_log(log: &std::path::Path, options: &Options) -> Result<ServedContent, ViewError> {
     let replay = replay::read(log)?;
     let title = log.file_name().unwrap_or(log.as_os_str());
-    let subject = info::Subject {
+    let subject = info::PageContent {
         description: &replay.description,
         title: title.to_string_lossy().into_owned(),
         log: Some(serde_json::json!({
@@ -131,7 +131,7 @@ fn shown_log(log: &std::path::Path, options: &Options) -> Result<Shown, ViewErro
         commands: false,
         pendant: false,
     };
-    Ok(Shown {
+    Ok(ServedContent {
         hub: Arc::new(Hub::new(Vec::new())),
         domain: None,
         name: subject.title.clone(),
@@ -152,7 +152,7 @@ fn run_live<const N: usize>(
         true => channel().1,
         false => hub.accept_commands(),
     };
-    let subject = info::Subject {
+    let subject = info::PageContent {
         description,
         title: domain.prefix().to_owned(),
         log: None,
@@ -160,7 +160,7 @@ fn run_live<const N: usize>(
         commands: !options.read_only,
         pendant: pendant::socket(domain).is_some(),
     };
-    let shown = Shown {
+    let shown = ServedContent {
         name: format!("supple {}", domain.prefix()),
         info: info::info(&subject)?,
         domain: Some(domain.clone()),
@@ -172,20 +172,20 @@ fn run_live<const N: usize>(
     live.run(&commands, stop)
 }
 
-/// Serves in a thread of its own.
-fn start(options: &Options, shown: Shown) -> Result<Addresses, ViewError> {
+/// Starts the server in a separate thread.
+fn start(options: &Options, shown: ServedContent) -> Result<Addresses, ViewError> {
     let port = options.port;
     let failed = |error| ViewError::Listen { port, error };
     let (listener, port) = server::listen(port).map_err(failed)?;
     let token = Token::new().map_err(failed)?;
-    let gate = Arc::new(Gate::new(token, port, &options.allow_origin));
+    let access = Arc::new(AccessCheck::new(token, port, &options.allow_origin));
     let addresses = Addresses {
-        url: gate.url(),
-        foxglove_url: gate.websocket_url(),
+        url: access.url(),
+        foxglove_url: access.websocket_url(),
     };
     let shown = Arc::new(shown);
     let server = std::thread::Builder::new().name("server".to_owned());
-    let started = server.spawn(move || server::run(&listener, &gate, &shown));
+    let started = server.spawn(move || server::run(&listener, &access, &shown));
     started.map_err(failed)?;
     Ok(addresses)
 }

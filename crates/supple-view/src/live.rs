@@ -1,8 +1,8 @@
-//! The thread that reads a running system's telemetry and sends its requests. Only it touches shared memory, and it
-//! polls: it has no way to delay the controller.
+//! The thread that reads the telemetry of a running system and sends requests to it. Only this thread accesses shared memory.
+//! It polls, so that it cannot delay the controller.
 
 use crate::error::ViewError;
-use crate::hub::{Answer, Hub, Pending};
+use crate::hub::{Answer, Hub, PendingCommand};
 use crate::snapshot::{CycleExtras, SnapshotBuilder};
 use core::time::Duration;
 use std::sync::mpsc::{Receiver, Sender};
@@ -13,7 +13,7 @@ use supple_log::{CycleTiming, Extras, LiveEncoder};
 use supple_model::Description;
 use supple_realtime::{Stop, monotonic_ns, pause};
 
-/// Channel of the snapshots; the channels of the log follow it.
+/// Id of the channel of snapshots; the ids of the log's channels follow.
 pub const VIEW_CHANNEL: u32 = 0;
 /// Time between two polls. The queue of telemetry holds two seconds at 1 kHz.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
@@ -21,11 +21,11 @@ const POLL_INTERVAL: Duration = Duration::from_millis(5);
 const SNAPSHOT_INTERVAL: Duration = Duration::from_millis(33);
 /// Time between two messages of each channel of the log \[ns\].
 const MESSAGE_INTERVAL_NS: u64 = 10_000_000;
-/// How long a request waits for its reply.
+/// Timeout of a reply to a request.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(4);
 
-/// A request that was sent.
-struct Sent {
+/// A request that awaits its reply.
+struct SentRequest {
     sequence: u64,
     at: Instant,
     answer: Sender<Answer>,
@@ -39,17 +39,17 @@ pub struct LiveConnection<'a, const N: usize> {
     encoder: LiveEncoder<N>,
     builder: SnapshotBuilder<N>,
     last: Option<Telemetry>,
-    sent: Vec<Sent>,
-    /// From the stamps of states to the time since the epoch \[ns\].
+    sent: Vec<SentRequest>,
+    /// Offset from the stamps of states to the time since the epoch \[ns\].
     offset_ns: u64,
     next_message_ns: u64,
 }
 
 impl<'a, const N: usize> LiveConnection<'a, N> {
-    /// Connects; as an operator too if `commands` is set.
+    /// Connects to the system, also as an operator if `commands` is set.
     ///
     /// # Errors
-    /// [`ViewError::Ipc`] if there is no free place, [`ViewError::Log`] for another arm.
+    /// [`ViewError::Ipc`] if no client slot is free, [`ViewError::Log`] if the system has another arm.
     pub fn new(
         domain: &Domain,
         description: &Description,
@@ -77,7 +77,11 @@ impl<'a, const N: usize> LiveConnection<'a, N> {
     ///
     /// # Errors
     /// [`ViewError::Ipc`] if shared memory cannot be accessed; [`ViewError::Log`] for a message that cannot be encoded.
-    pub fn run(&mut self, commands: &Receiver<Pending>, stop: &Stop) -> Result<(), ViewError> {
+    pub fn run(
+        &mut self,
+        commands: &Receiver<PendingCommand>,
+        stop: &Stop,
+    ) -> Result<(), ViewError> {
         let mut last_snapshot = Instant::now();
         while !stop.shutdown_requested() {
             while let Some(telemetry) = self.reader.receive()? {
@@ -117,7 +121,7 @@ impl<'a, const N: usize> LiveConnection<'a, N> {
         self.builder.add(&record, extras);
         self.last = Some(*telemetry);
         let time_ns = telemetry.state.stamp_ns.saturating_add(self.offset_ns);
-        // The clock of the states begins anew with the plant.
+        // The stamps of states restart with the plant.
         let due =
             time_ns >= self.next_message_ns || self.next_message_ns > time_ns + MESSAGE_INTERVAL_NS;
         let channels = self.hub.channels().len() as u32;
@@ -150,10 +154,10 @@ impl<'a, const N: usize> LiveConnection<'a, N> {
         self.hub.set_latest(snapshot);
     }
 
-    fn send(&mut self, pending: Pending) -> Result<(), ViewError> {
-        let Pending { command, answer } = pending;
+    fn send(&mut self, pending: PendingCommand) -> Result<(), ViewError> {
+        let PendingCommand { command, answer } = pending;
         let refuse = |reason: &str| {
-            // The viewer may have gone.
+            // The viewer may have disconnected.
             let _ = answer.send(Err(reason.to_owned()));
             Ok(())
         };
@@ -161,19 +165,19 @@ impl<'a, const N: usize> LiveConnection<'a, N> {
             return refuse("no system is running");
         };
         let Some(request) = command.request::<N>(&last.record_of()) else {
-            return refuse("no request to the controller");
+            return refuse("this command is not a request to the controller");
         };
         match operator.send(&request, None)? {
             Some(sequence) => {
                 let at = Instant::now();
-                self.sent.push(Sent {
+                self.sent.push(SentRequest {
                     sequence,
                     at,
                     answer,
                 });
                 Ok(())
             }
-            None => refuse("the controller does not answer, or has too many requests"),
+            None => refuse("the controller does not answer, or its request queue is full"),
         }
     }
 
@@ -182,7 +186,7 @@ impl<'a, const N: usize> LiveConnection<'a, N> {
             return Ok(());
         };
         while let Some(reply) = operator.receive()? {
-            let of_this = |sent: &Sent| sent.sequence == reply.sequence;
+            let of_this = |sent: &SentRequest| sent.sequence == reply.sequence;
             if let Some(index) = self.sent.iter().position(of_this) {
                 let _ = self.sent.swap_remove(index).answer.send(in_words(&reply));
             }
@@ -202,14 +206,14 @@ fn in_words(reply: &OperatorReply) -> Answer {
     }
 }
 
-/// Channel of a message of the log.
+/// Returns the id of the channel of a message of the log.
 fn channel_of(index: usize) -> u32 {
     VIEW_CHANNEL + 1 + index as u32
 }
 
 #[expect(
     clippy::disallowed_methods,
-    reason = "viewers order messages by the time of day; nothing is computed from it"
+    reason = "viewers order messages by the time of day; the system does not use it"
 )]
 fn since_epoch_ns() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);

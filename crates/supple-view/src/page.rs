@@ -1,9 +1,9 @@
-//! The page's files, embedded in the program. `page/build.sh` makes the bundle from three.js and uPlot.
+//! The files of the page, embedded in the program. `page/build.sh` builds the bundle, which contains three.js and uPlot.
 
 /// A file of the page.
 #[derive(Clone, Copy, Debug)]
 pub struct PageFile {
-    /// Name in the URL, after the token.
+    /// Path in the URL after the token.
     pub name: &'static str,
     /// Media type.
     pub media_type: &'static str,
@@ -11,7 +11,7 @@ pub struct PageFile {
     pub bytes: &'static [u8],
 }
 
-/// Every file.
+/// All files of the page.
 pub const FILES: [PageFile; 4] = [
     PageFile {
         name: "",
@@ -40,7 +40,7 @@ mod tests {
     use super::FILES;
 
     #[test]
-    fn the_page_is_small_and_asks_nobody_else() {
+    fn the_page_is_smaller_than_2_mb_and_loads_nothing_from_other_servers() {
         let size: usize = FILES.iter().map(|file| file.bytes.len()).sum();
         assert!(size < 2_000_000, "{size} bytes");
         let index = String::from_utf8_lossy(FILES[0].bytes);
@@ -48,6 +48,9 @@ mod tests {
             !index.contains("http:") && !index.contains("https:"),
             "{index}"
         );
-        assert!(!index.contains("<script>"), "the content policy forbids it");
+        assert!(
+            !index.contains("<script>"),
+            "the content security policy forbids inline scripts"
+        );
     }
 }

@@ -1,4 +1,5 @@
-//! The pendant of an emulated arm: a socket in the folder of its bus; each text line is answered by one line of JSON.
+//! Client of the pendant of an emulated arm: a socket in the folder of the bus, which answers each text line with one line of
+//! JSON.
 
 use core::time::Duration;
 use std::io::{Read, Write};
@@ -12,7 +13,7 @@ const SOCKET: &str = "pendant";
 /// Timeout for a reply.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Socket of the pendant of this system; `None` if it has no emulated arm.
+/// Returns the socket of the pendant of this system; `None` if the system has no emulated arm.
 pub fn socket(domain: &Domain) -> Option<PathBuf> {
     let Ok(Address::Folder(folder)) = Address::of_system(domain.prefix()) else {
         return None;
@@ -20,10 +21,10 @@ pub fn socket(domain: &Domain) -> Option<PathBuf> {
     Some(folder.join(SOCKET)).filter(|socket| socket.exists())
 }
 
-/// Presses a button.
+/// Presses a button of the pendant.
 ///
 /// # Errors
-/// Why it could not be pressed.
+/// The reason why the button could not be pressed.
 pub fn press(domain: &Domain, line: &str) -> Result<(), String> {
     let socket = socket(domain).ok_or("this system has no emulated pendant")?;
     let exchange = || -> std::io::Result<String> {

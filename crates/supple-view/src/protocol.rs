@@ -1,25 +1,25 @@
-//! Messages of the Foxglove WebSocket protocol, version 1: what stock viewers such as Lichtblick speak, and the page too.
+//! Messages of the Foxglove WebSocket protocol, version 1, which the page and other viewers such as Lichtblick use.
 //! Source: <https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md>.
 //!
-//! Written here and not taken from the Foxglove SDK: its server accepts whoever connects, and this one moves an arm.
+//! This module replaces the Foxglove SDK because the server of the SDK accepts every client, and this server moves an arm.
 
 use crate::command::{PARAMETERS, SCHEMA, parameter};
 use crate::snapshot::Snapshot;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-/// Subprotocols that viewers ask for: the protocol's own name, and that of newer clients for the same messages.
+/// Subprotocols that viewers request: the name of the protocol, and the name that newer clients use for the same messages.
 pub const SUBPROTOCOLS: [&str; 2] = ["foxglove.websocket.v1", "foxglove.sdk.v1"];
 /// Id of the service that takes commands.
 pub const SERVICE_ID: u32 = 1;
-/// Name of this service.
+/// Name of the service that takes commands.
 pub const SERVICE_NAME: &str = "/request";
 
 /// Opcode of a message on a subscribed channel.
 const MESSAGE_DATA: u8 = 1;
 /// Opcode of a request to a service.
 const SERVICE_CALL_REQUEST: u8 = 2;
-/// Opcode of its response.
+/// Opcode of a response of a service.
 const SERVICE_CALL_RESPONSE: u8 = 3;
 
 /// A channel that viewers can subscribe to; its id is its index.
@@ -27,56 +27,56 @@ const SERVICE_CALL_RESPONSE: u8 = 3;
 pub struct Channel {
     /// Topic.
     pub topic: String,
-    /// Encoding of its messages.
+    /// Encoding of the messages.
     pub encoding: &'static str,
-    /// Name of their type.
+    /// Name of the message type.
     pub schema_name: String,
-    /// Encoding of its definition.
+    /// Encoding of the definition of the message type.
     pub schema_encoding: &'static str,
-    /// The definition.
+    /// Definition of the message type.
     pub schema: String,
 }
 
-/// What a viewer sends as text.
+/// Text message of a viewer.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 #[serde(tag = "op", rename_all = "camelCase")]
 pub enum ClientMessage {
-    /// Channels to send from now on.
+    /// Subscribes to channels.
     Subscribe {
-        /// Each with the id under which its messages are sent.
+        /// The subscriptions.
         subscriptions: Vec<Subscription>,
     },
-    /// Subscriptions to end.
+    /// Ends subscriptions.
     #[serde(rename_all = "camelCase")]
     Unsubscribe {
-        /// Their ids.
+        /// Ids of the subscriptions.
         subscription_ids: Vec<u32>,
     },
-    /// Asks for parameters.
+    /// Requests parameters.
     #[serde(rename_all = "camelCase")]
     GetParameters {
-        /// Names; none for all.
+        /// Names of the parameters; an empty list requests all.
         parameter_names: Vec<String>,
-        /// To be repeated in the answer.
+        /// Id that the answer repeats.
         id: Option<String>,
     },
     /// Changes parameters.
     SetParameters {
-        /// Name and value of each.
+        /// The parameters.
         parameters: Vec<Parameter>,
-        /// To be repeated in the answer.
+        /// Id that the answer repeats.
         id: Option<String>,
     },
-    /// Asks for the values of parameters whenever they change: of all, whatever the names.
+    /// Requests the values of all parameters whenever they change; parameter names are ignored.
     SubscribeParameterUpdates {},
-    /// Ends that.
+    /// Ends the updates of parameters.
     UnsubscribeParameterUpdates {},
-    /// Anything else, which needs no answer.
+    /// Any other message, which needs no answer.
     #[serde(other)]
     Other,
 }
 
-/// A channel to send.
+/// A subscription to a channel.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
 #[serde(rename_all = "camelCase")]
 pub struct Subscription {
@@ -89,9 +89,9 @@ pub struct Subscription {
 /// A parameter to change.
 #[derive(Clone, Debug, Deserialize, PartialEq)]
 pub struct Parameter {
-    /// Its name.
+    /// Name of the parameter.
     pub name: String,
-    /// Its value.
+    /// Value of the parameter.
     #[serde(default)]
     pub value: Value,
 }
@@ -103,11 +103,11 @@ pub struct ServiceCall<'a> {
     pub service_id: u32,
     /// Id of the call, chosen by the viewer.
     pub call_id: u32,
-    /// Its data.
+    /// Data of the request.
     pub payload: &'a [u8],
 }
 
-/// The message `serverInfo`, the first to a viewer.
+/// Creates the message `serverInfo`, which a viewer receives first.
 pub fn server_info(name: &str, session: &str, accepts_commands: bool) -> String {
     let capabilities: &[&str] = match accepts_commands {
         true => &["parameters", "parametersSubscribe", "services"],
@@ -118,7 +118,7 @@ pub fn server_info(name: &str, session: &str, accepts_commands: bool) -> String 
     .to_string()
 }
 
-/// The message `advertise`, with the channels.
+/// Creates the message `advertise` with the channels.
 pub fn advertise(channels: &[Channel]) -> String {
     let channels: Vec<Value> = channels
         .iter()
@@ -132,7 +132,7 @@ pub fn advertise(channels: &[Channel]) -> String {
     json!({"op": "advertise", "channels": channels}).to_string()
 }
 
-/// The message `advertiseServices`, with the service that takes commands.
+/// Creates the message `advertiseServices` with the service that takes commands.
 pub fn advertise_services() -> String {
     let described = |name: &str, schema: &str| json!({"encoding": "json", "schemaName": name, "schemaEncoding": "jsonschema", "schema": schema});
     json!({"op": "advertiseServices", "services": [{
@@ -143,7 +143,7 @@ pub fn advertise_services() -> String {
     .to_string()
 }
 
-/// The message `parameterValues`, for these names, or for all parameters if there are none.
+/// Creates the message `parameterValues` for these names, or for all parameters if `names` is empty.
 pub fn parameter_values(snapshot: Option<&Snapshot>, names: &[String], id: Option<&str>) -> String {
     let wanted = |name: &&&str| names.is_empty() || names.iter().any(|other| other == **name);
     let value = |name: &&str| {
@@ -158,18 +158,18 @@ pub fn parameter_values(snapshot: Option<&Snapshot>, names: &[String], id: Optio
     message.to_string()
 }
 
-/// A status message; level 2 is an error.
+/// Creates a status message; level 2 is an error.
 pub fn status(level: u8, message: &str) -> String {
     json!({"op": "status", "level": level, "message": message}).to_string()
 }
 
-/// A failed call of a service.
+/// Creates the message for a failed service call.
 pub fn call_failure(call: &ServiceCall<'_>, message: &str) -> String {
     json!({"op": "serviceCallFailure", "serviceId": call.service_id, "callId": call.call_id, "message": message})
         .to_string()
 }
 
-/// A message on a channel, to this subscription.
+/// Creates a message on a channel for this subscription.
 pub fn message_data(subscription: u32, time_ns: u64, payload: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(13 + payload.len());
     bytes.push(MESSAGE_DATA);
@@ -179,7 +179,7 @@ pub fn message_data(subscription: u32, time_ns: u64, payload: &[u8]) -> Vec<u8> 
     bytes
 }
 
-/// The response to a call of a service, in JSON.
+/// Creates the response to a service call, in JSON.
 pub fn call_response(call: &ServiceCall<'_>, payload: &[u8]) -> Vec<u8> {
     let mut bytes = vec![SERVICE_CALL_RESPONSE];
     bytes.extend_from_slice(&call.service_id.to_le_bytes());
@@ -190,7 +190,7 @@ pub fn call_response(call: &ServiceCall<'_>, payload: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// Parses a binary message of a viewer; `None` if it is no call of a service in JSON.
+/// Parses a binary message of a viewer; returns `None` if it is not a service call in JSON.
 pub fn service_call(bytes: &[u8]) -> Option<ServiceCall<'_>> {
     let (&SERVICE_CALL_REQUEST, rest) = bytes.split_first()? else {
         return None;
@@ -212,7 +212,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bytes_are_those_of_the_specification() {
+    fn encoded_messages_equal_the_specification() {
         // Section "Message Data": opcode, subscription, time, payload, little-endian.
         let message = message_data(0x0102, 0x0304, b"ab");
         assert_eq!(message, [1, 2, 1, 0, 0, 4, 3, 0, 0, 0, 0, 0, 0, b'a', b'b']);
@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn messages_of_viewers_are_read_and_unknown_ones_ignored() {
+    fn messages_of_viewers_are_parsed_and_unknown_ones_ignored() {
         let read = |text: &str| serde_json::from_str::<ClientMessage>(text);
         let subscribe = r#"{"op":"subscribe","subscriptions":[{"id":7,"channelId":2}]}"#;
         let subscriptions = vec![Subscription {

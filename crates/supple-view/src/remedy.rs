@@ -1,12 +1,12 @@
-//! What an operator does about a fault, in a sentence.
+//! Remedy for each kind of fault, as a sentence for the operator.
 
 use supple_core::codes::fault_kind as fault;
 
-/// The remedy of a kind of fault, see [`fault_kind`](supple_core::codes::fault_kind).
+/// Returns the remedy for a kind of fault, see [`fault_kind`](supple_core::codes::fault_kind).
 pub fn remedy(kind: u8) -> &'static str {
     match kind {
         fault::MEASUREMENT_NOT_FINITE => {
-            "Check the sensor and its cable; the arm brakes until it gives numbers again."
+            "Check the sensor and its cable; the arm brakes until the sensor reports finite values again."
         }
         fault::ENCODER_LOST => {
             "Check the bus and the cable of this joint, then reset and enter gravity hold."
@@ -15,7 +15,7 @@ pub fn remedy(kind: u8) -> &'static str {
             "The plant sent no states: check its process and the load of the machine (supple doctor), then reset."
         }
         fault::STATE_OUT_OF_ORDER => {
-            "A second plant writes states, or the plant restarted: end the other one, then reset."
+            "A second plant writes states, or the plant restarted: end the other plant, then reset."
         }
         fault::JOINT_POSITION => {
             "Reset, enter float and guide the joint away from its stop by hand."
@@ -42,7 +42,7 @@ pub fn remedy(kind: u8) -> &'static str {
             "The joint did not follow its move: check for an obstacle, the drives and the payload; then reset."
         }
         fault::JOINT_COLLISION | fault::TIP_COLLISION => {
-            "The arm met something: remove it, or request a contact mode; then reset."
+            "The arm touched an object: remove the object, or request a contact mode; then reset."
         }
         fault::MOVES_AGAINST_TORQUE => {
             "The joint moves against its torque: check the sign of its torque and of its encoder."
@@ -51,12 +51,12 @@ pub fn remedy(kind: u8) -> &'static str {
             "The loop is unstable: lower the gains, or measure the delay of the loop and enter it; then reset."
         }
         fault::UNMODELLED_LOAD => {
-            "The arm carries a load that its model lacks: remove it or describe it; then reset."
+            "The arm carries a load that its model lacks: remove the load or add it to the model; then reset."
         }
         fault::WORKSPACE => "Reset, enter float and guide the tip back into its workspace.",
         fault::ZONE_SPEED => "Reset, then request a slower motion in this zone.",
         fault::ZONE_FORCE => {
-            "The tip pressed too hard in this zone: remove what it met, then reset."
+            "The contact force in this zone was too high: remove the object that the tip touched, then reset."
         }
         fault::SINGULAR => {
             "Reset, then move the arm away from the singular pose before the pose mode."
@@ -70,7 +70,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_fault_has_a_remedy_of_its_own_kind() {
+    fn every_fault_has_a_specific_remedy() {
         let general = remedy(u8::MAX);
         let faults = fault::ALL.iter().filter(|code| code.number != fault::NONE);
         for code in faults {

@@ -1,4 +1,4 @@
-//! A log as snapshots, evenly spaced, for the page's time slider.
+//! Converts a log to evenly spaced snapshots for the time slider of the page.
 
 use crate::error::ViewError;
 use crate::snapshot::{CycleExtras, Snapshot, SnapshotBuilder};
@@ -6,9 +6,9 @@ use std::path::Path;
 use supple_log::{CycleTiming, LogError, Reader, TimedMessage};
 use supple_model::{Description, with_dof};
 
-/// Most snapshots of a log; a longer one has fewer snapshots a second.
+/// Maximum number of snapshots of a log; a longer log has fewer snapshots per second.
 const MAX_SNAPSHOTS: usize = 4000;
-/// Least time between two snapshots \[s\].
+/// Minimum time between two snapshots \[s\].
 const MIN_INTERVAL_S: f64 = 0.02;
 
 /// A log to show.
@@ -18,18 +18,18 @@ pub struct Replay {
     pub description: Description,
     /// Name of the experiment.
     pub experiment: String,
-    /// The snapshots; their time is counted from the first cycle.
+    /// The snapshots, with times since the first cycle.
     pub snapshots: Vec<Snapshot>,
     /// Time between two snapshots \[s\].
     pub interval_s: f64,
-    /// The log stops before its end.
+    /// Whether the log is truncated.
     pub incomplete: bool,
 }
 
 /// Reads a log.
 ///
 /// # Errors
-/// [`ViewError::Log`] if it is no log with at least one cycle.
+/// [`ViewError::Log`] if the file is not a log with at least one cycle.
 pub fn read(file: &Path) -> Result<Replay, ViewError> {
     let reader = Reader::open(file)?;
     let description = reader.description()?;
@@ -91,7 +91,7 @@ fn snapshots<const N: usize>(reader: &Reader) -> Result<(Vec<Snapshot>, f64, boo
     Ok((snapshots, interval_s, incomplete))
 }
 
-/// Every second snapshot, with the peaks of the one before it.
+/// Keeps every second snapshot, which gets the peaks of the one before it.
 fn halved(snapshots: Vec<Snapshot>) -> Vec<Snapshot> {
     let mut snapshots = snapshots.into_iter();
     let mut kept = Vec::new();

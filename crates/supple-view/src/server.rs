@@ -1,6 +1,6 @@
-//! Listens on 127.0.0.1, and gives every connection a thread of its own.
+//! Listens on 127.0.0.1 and serves every connection in a separate thread.
 
-use crate::http::{Gate, Head, Rejected, respond};
+use crate::http::{AccessCheck, Rejected, RequestHead, respond};
 use crate::hub::Hub;
 use crate::page::FILES;
 use crate::protocol::SUBPROTOCOLS;
@@ -12,31 +12,31 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
 use supple_ipc::Domain;
 
-/// Most connections at a time.
+/// Maximum number of simultaneous connections.
 const MAX_CONNECTIONS: usize = 32;
-/// How long a peer may take to read the answer.
+/// Timeout for writing a response to a peer.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(5);
-/// What a WebSocket's key is digested with (RFC 6455, section 1.3).
+/// GUID with which the key of a WebSocket is hashed (RFC 6455, section 1.3).
 const WEBSOCKET_ID: &[u8] = b"258EAFA5-E914-47DA-95CA-C5AB0DC85B11";
 
-/// What the server shows.
-pub struct Shown {
-    /// What the threads share.
+/// Content that the server serves.
+pub struct ServedContent {
+    /// State shared by the threads.
     pub hub: Arc<Hub>,
     /// The running system; `None` for a log.
     pub domain: Option<Domain>,
-    /// Name of what is shown.
+    /// Name of the running system or of the log.
     pub name: String,
-    /// The page's description of it, JSON.
+    /// Description for the page, as JSON.
     pub info: Vec<u8>,
-    /// Snapshots of a log, JSON; `None` for a running system.
+    /// Snapshots of a log, as JSON; `None` for a running system.
     pub log: Option<Vec<u8>>,
 }
 
 /// Opens the port on the loopback interface; 0 for a free one.
 ///
 /// # Errors
-/// If it is in use.
+/// If the port is in use.
 pub fn listen(port: u16) -> io::Result<(TcpListener, u16)> {
     let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))?;
     let port = listener.local_addr()?.port();
@@ -44,7 +44,7 @@ pub fn listen(port: u16) -> io::Result<(TcpListener, u16)> {
 }
 
 /// Serves connections until the process ends.
-pub fn run(listener: &TcpListener, gate: &Arc<Gate>, shown: &Arc<Shown>) {
+pub fn run(listener: &TcpListener, access: &Arc<AccessCheck>, shown: &Arc<ServedContent>) {
     let open = Arc::new(AtomicUsize::new(0));
     let session = std::process::id().to_string();
     static CONNECTIONS: AtomicU64 = AtomicU64::new(0);
@@ -57,14 +57,14 @@ pub fn run(listener: &TcpListener, gate: &Arc<Gate>, shown: &Arc<Shown>) {
             open.fetch_sub(1, Ordering::AcqRel);
             continue;
         }
-        let (gate, shown, session) = (gate.clone(), shown.clone(), session.clone());
+        let (access, shown, session) = (access.clone(), shown.clone(), session.clone());
         let id = CONNECTIONS.fetch_add(1, Ordering::Relaxed);
         let count = open.clone();
         let started = std::thread::Builder::new()
             .name("connection".to_owned())
             .spawn(move || {
-                // A peer that goes away in the middle is no error of this program.
-                let _ = handle(stream, &gate, &shown, &session, id);
+                // A peer that disconnects is no error of this program.
+                let _ = handle(stream, &access, &shown, &session, id);
                 count.fetch_sub(1, Ordering::AcqRel);
             });
         if started.is_err() {
@@ -75,13 +75,13 @@ pub fn run(listener: &TcpListener, gate: &Arc<Gate>, shown: &Arc<Shown>) {
 
 fn handle(
     mut stream: TcpStream,
-    gate: &Gate,
-    shown: &Shown,
+    access: &AccessCheck,
+    shown: &ServedContent,
     session: &str,
     id: u64,
 ) -> io::Result<()> {
     stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
-    let Some(head) = Head::read(&mut stream)? else {
+    let Some(head) = RequestHead::read(&mut stream)? else {
         return respond(
             &mut stream,
             "400 Bad Request",
@@ -89,7 +89,7 @@ fn handle(
             b"Invalid request.\n",
         );
     };
-    let path = match gate.check(&head) {
+    let path = match access.check(&head) {
         Ok(path) => path,
         Err(rejected) => return reject(&mut stream, rejected),
     };
@@ -106,7 +106,7 @@ fn handle(
                 &mut stream,
                 "404 Not Found",
                 "text/plain",
-                b"No such page.\n",
+                b"This page does not exist.\n",
             )?,
         },
     }
@@ -120,8 +120,8 @@ fn reject(stream: &mut TcpStream, rejected: Rejected) -> io::Result<()> {
 
 fn websocket(
     mut stream: TcpStream,
-    head: &Head,
-    shown: &Shown,
+    head: &RequestHead,
+    shown: &ServedContent,
     session: &str,
     id: u64,
 ) -> io::Result<()> {
@@ -162,13 +162,13 @@ fn websocket(
         name: &shown.name,
         session,
     };
-    // A viewer may leave at any time and in any way.
+    // A viewer may disconnect at any time.
     let _ = serve(&context, &viewer, stream, head.rest.clone());
     shown.hub.leave(id);
     Ok(())
 }
 
-/// The answer to the key of a WebSocket.
+/// Returns the value of `Sec-WebSocket-Accept` for the key of a WebSocket.
 fn accept_key(key: &str) -> String {
     let mut digest = sha1_smol::Sha1::new();
     digest.update(key.as_bytes());
@@ -179,7 +179,7 @@ fn accept_key(key: &str) -> String {
 #[cfg(test)]
 mod tests {
     #[test]
-    fn the_accept_key_is_that_of_the_standard() {
+    fn the_accept_key_equals_the_example_of_the_standard() {
         // RFC 6455, section 1.3.
         let key = super::accept_key("dGhlIHNhbXBsZSBub25jZQ==");
         assert_eq!(key, "s3pPLMBiTxaQ9kYGzzhZRbK+xOo=");

@@ -1,5 +1,5 @@
-//! A snapshot of the system: the latest cycle, with the greatest error, force and times since the previous snapshot and
-//! any contact, so that none of these falls between two.
+//! A snapshot of the system: the latest cycle, with the maximum of error, force and times since the previous snapshot, and
+//! whether any cycle since then had contact, so that no peak is lost between two snapshots.
 
 use crate::remedy::remedy;
 use serde::Serialize;
@@ -7,33 +7,33 @@ use supple_core::codes::{fault_name, refusal_kind};
 use supple_core::controller::CycleRecord;
 use supple_core::math::Vector;
 
-/// What is known of a cycle besides its record.
+/// Data of a cycle that its record does not contain.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CycleExtras {
     /// Time of the measurement, on any clock \[s\].
     pub time_s: f64,
     /// Period since the previous cycle, latency from the measurement to the start of the step, duration of the step \[us\].
     pub timing_us: Option<[f64; 3]>,
-    /// From the state to its answer \[us\]; 0 if unknown.
+    /// Time from the state to its answer \[us\]; 0 if unknown.
     pub round_trip_us: f64,
-    /// Cycles without an answer since the start.
+    /// Number of cycles without an answer since the start.
     pub missed: u64,
-    /// The plant holds the arm or lays it down itself.
+    /// Whether the plant holds the arm or lays it down.
     pub held: bool,
 }
 
-/// A fault in words.
+/// A fault as text.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct FaultText {
-    /// Its name.
+    /// Name of the fault.
     pub name: &'static str,
-    /// What happened.
+    /// Description of the fault.
     pub text: String,
-    /// What to do about it.
+    /// Remedy.
     pub remedy: &'static str,
 }
 
-/// State of the system at one time, as the page receives it. Joints in order; positions in base axes.
+/// State of the system at one time, as the page receives it. Lists have one entry per joint; positions are in base axes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Snapshot {
     /// Time of the measurement \[s\].
@@ -42,41 +42,41 @@ pub struct Snapshot {
     pub cycle: u64,
     /// Mode of the controller.
     pub mode: &'static str,
-    /// The drives apply torques: the controller's, or those with which they hold the arm and lay it down.
+    /// Whether the drives apply torques, either of the controller or of the plant that holds the arm or lays it down.
     pub drives_active: bool,
     /// Joint angles \[rad\].
     pub joints_rad: Vec<f32>,
-    /// Tip \[m\].
+    /// Position of the tip \[m\].
     pub tip_m: [f32; 3],
-    /// Its reference \[m\].
+    /// Reference position of the tip \[m\].
     pub reference_m: Option<[f32; 3]>,
-    /// Greatest distance of the tip from its reference \[m\].
+    /// Maximum distance of the tip from its reference since the previous snapshot \[m\].
     pub tip_error_m: Option<f32>,
-    /// Force on the tip: measured, otherwise observed; the greatest since the previous snapshot \[N\].
+    /// Maximum force on the tip since the previous snapshot \[N\]: measured, or observed if there is no sensor.
     pub force_n: [f32; 3],
-    /// That force was measured by a sensor.
+    /// Whether a sensor measured this force.
     pub force_is_measured: bool,
-    /// Contact was latched in a cycle since the previous snapshot.
+    /// Whether contact was latched in any cycle since the previous snapshot.
     pub in_contact: bool,
     /// Joint torques \[N m\].
     pub torque_nm: Vec<f32>,
     /// Each term of the torque, as `terms` of the page's description lists them, for each joint \[N m\].
     pub terms_nm: Vec<Vec<f32>>,
-    /// Stiffness now in effect \[N/m\].
+    /// Present stiffness \[N/m\].
     pub stiffness_n_per_m: [f32; 3],
-    /// Damping now in effect \[N s/m\].
+    /// Present damping \[N s/m\].
     pub damping_n_s_per_m: [f32; 3],
-    /// Greatest period, delay and duration of a step \[us\].
+    /// Maximum period, latency and duration of a step since the previous snapshot \[us\].
     pub timing_us: Option<[f32; 3]>,
-    /// Greatest time from a state to its answer \[us\].
+    /// Maximum time from a state to its answer since the previous snapshot \[us\].
     pub round_trip_us: f32,
-    /// Cycles without an answer since the start.
+    /// Number of cycles without an answer since the start.
     pub missed: u64,
     /// The latched fault.
     pub fault: Option<FaultText>,
     /// The last refusal since the previous snapshot.
     pub refusal: Option<String>,
-    /// Learning is on.
+    /// Whether learning is on.
     pub learning: bool,
 }
 
@@ -85,7 +85,7 @@ pub struct Snapshot {
 pub struct SnapshotBuilder<const N: usize> {
     last: Option<(CycleRecord<N>, CycleExtras)>,
     tip_error_m: Option<f64>,
-    /// The greatest force, its size, and whether a sensor measured it \[N\].
+    /// Magnitude and components of the maximum force \[N\], and whether a sensor measured it.
     force: (f64, [f64; 3], bool),
     in_contact: bool,
     timing_us: Option<[f64; 3]>,
@@ -131,7 +131,7 @@ impl<const N: usize> SnapshotBuilder<N> {
         self.last = Some((*record, extras));
     }
 
-    /// The snapshot of the cycles since the last one; `None` without any.
+    /// Returns the snapshot of the cycles since the previous snapshot; `None` if there are no cycles.
     pub fn take(&mut self) -> Option<Snapshot> {
         let SnapshotBuilder {
             last,
@@ -199,13 +199,13 @@ fn joints<const N: usize>(values: &Vector<N>) -> Vec<f32> {
 mod tests {
     use super::*;
 
-    /// A record of zeros: every word of a record is a number, a count or a flag.
+    /// Returns a record of zeros, which is valid because every word of a record is a number, a count or a flag.
     fn record() -> CycleRecord<3> {
         CycleRecord::unpack(&[0; CycleRecord::<3>::words(3)], 3)
     }
 
     #[test]
-    fn a_peak_between_two_pictures_is_in_the_later_one() {
+    fn a_peak_between_two_snapshots_is_in_the_later_one() {
         let mut builder = SnapshotBuilder::default();
         for (error_m, force_n, step_us) in
             [(0.001, 1.0, 20.0), (0.009, -30.0, 90.0), (0.002, 2.0, 10.0)]
@@ -226,13 +226,13 @@ mod tests {
         assert_eq!(snapshot.force_n, [0.0, 0.0, -30.0]);
         assert!(snapshot.in_contact);
         assert_eq!(snapshot.timing_us, Some([1000.0, 5.0, 90.0]));
-        // The positions are those of the latest cycle, and nothing is left over for the next snapshot.
+        // The positions are those of the latest cycle, and the peaks are reset for the next snapshot.
         assert_eq!(snapshot.reference_m, Some([0.002, 0.0, 0.0]));
         assert_eq!(builder.take(), None);
     }
 
     #[test]
-    fn a_fault_comes_with_its_remedy() {
+    fn a_fault_contains_its_remedy() {
         let mut record = record();
         record.fault = supple_core::codes::fault_kind::TIP_SPEED;
         let mut builder = SnapshotBuilder::default();

@@ -1,18 +1,18 @@
-//! The secret in the URL: another user of the machine can connect to the port, but does not have it.
+//! The secret token in the URL. Other users of the machine can connect to the port, but do not know the token.
 
 use std::io;
 
-/// Random bytes of a token.
+/// Number of random bytes of a token.
 const BYTES: usize = 16;
 
 /// A secret of 128 random bits, written as 32 hexadecimal digits.
 pub struct Token(String);
 
 impl Token {
-    /// A new token from the random numbers of the kernel.
+    /// Creates a token from random numbers of the kernel.
     ///
     /// # Errors
-    /// If the kernel has none.
+    /// If the kernel provides no random numbers.
     pub fn new() -> io::Result<Token> {
         let mut bytes = [0; BYTES];
         let filled = rustix::rand::getrandom(&mut bytes[..], rustix::rand::GetRandomFlags::empty());
@@ -29,7 +29,7 @@ impl Token {
         &self.0
     }
 
-    /// Whether the text is the token. The time it takes does not depend on how much of it is right.
+    /// Whether the text is the token. The duration of the comparison does not depend on the number of equal characters.
     pub fn matches(&self, text: &str) -> bool {
         let (own, other) = (self.0.as_bytes(), text.as_bytes());
         let differing = own.iter().zip(other).fold(0, |bits, (a, b)| bits | (a ^ b));

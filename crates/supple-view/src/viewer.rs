@@ -1,6 +1,6 @@
-//! One WebSocket connection: reads what the viewer sends, writes what waits for it.
+//! One WebSocket connection: reads the messages of the viewer and writes the messages that wait for it.
 
-use crate::calls::{Calls, ReplyTo};
+use crate::calls::{PendingCalls, ReplyTo};
 use crate::command::{Command, set_parameters};
 use crate::hub::{Answer, Hub, Viewer};
 use crate::protocol::{
@@ -14,31 +14,31 @@ use supple_ipc::Domain;
 use tungstenite::protocol::{Role, WebSocketConfig};
 use tungstenite::{Error, Message, WebSocket};
 
-/// How long a read waits before waiting messages are written.
+/// Timeout of a read, after which waiting messages are written.
 const READ_TIMEOUT: Duration = Duration::from_millis(10);
-/// How long a write waits for a viewer that does not read.
+/// Timeout of a write to a viewer that does not read.
 const WRITE_TIMEOUT: Duration = Duration::from_secs(2);
-/// Longest message of a viewer.
+/// Maximum length of a message of a viewer \[bytes\].
 const MAX_MESSAGE_BYTES: usize = 64 * 1024;
 /// Time between two messages with changed parameters.
 const PARAMETER_INTERVAL: Duration = Duration::from_millis(200);
 
-/// What a connection needs of its server.
+/// Data of the server that a connection uses.
 pub struct Context<'a> {
-    /// What the threads share.
+    /// State shared by the threads.
     pub hub: &'a Hub,
     /// The running system; `None` for a log.
     pub domain: Option<&'a Domain>,
-    /// Name of what is shown.
+    /// Name of the running system or of the log.
     pub name: &'a str,
-    /// Id of this run of the server, which is no secret.
+    /// Id of this run of the server; not secret.
     pub session: &'a str,
 }
 
-/// Serves a viewer after the handshake; `rest` is what it sent behind it.
+/// Serves a viewer after the handshake; `rest` is the data that the viewer sent after it.
 ///
 /// # Errors
-/// Of the connection.
+/// If the connection fails.
 pub fn serve(
     context: &Context<'_>,
     viewer: &Viewer,
@@ -60,8 +60,8 @@ pub fn serve(
     if commands {
         socket.send(Message::text(advertise_services()))?;
     }
-    let mut updates = Updates::default();
-    let mut calls = Calls::default();
+    let mut updates = ParameterUpdates::default();
+    let mut calls = PendingCalls::default();
     loop {
         match socket.read() {
             Ok(Message::Text(text)) => {
@@ -78,7 +78,7 @@ pub fn serve(
             Err(Error::Io(error)) if is_timeout(&error) => {}
             Err(error) => return Err(error),
         }
-        for (reply_to, answer) in calls.answered() {
+        for (reply_to, answer) in calls.take_answers() {
             for message in replies(hub, reply_to, answer) {
                 socket.send(message)?;
             }
@@ -93,14 +93,14 @@ pub fn serve(
     }
 }
 
-/// Changed parameters, for viewers that asked for them.
+/// Sends changed parameters to a viewer that has subscribed to them.
 #[derive(Default)]
-struct Updates {
+struct ParameterUpdates {
     subscribed: bool,
     sent: Option<([f32; 3], [f32; 3], Instant)>,
 }
 
-impl Updates {
+impl ParameterUpdates {
     fn due(&mut self, hub: &Hub) -> Option<String> {
         let waits = |(_, _, at): ([f32; 3], [f32; 3], Instant)| at.elapsed() < PARAMETER_INTERVAL;
         if !self.subscribed || self.sent.is_some_and(waits) {
@@ -121,12 +121,12 @@ fn is_timeout(error: &std::io::Error) -> bool {
     matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut)
 }
 
-/// Handles a text of the viewer; returns the answers that need no waiting.
+/// Handles a text message of the viewer; returns the answers that are available at once.
 fn text_message(
     context: &Context<'_>,
     viewer: &Viewer,
-    updates: &mut Updates,
-    calls: &mut Calls,
+    updates: &mut ParameterUpdates,
+    calls: &mut PendingCalls,
     text: &str,
 ) -> Vec<String> {
     let hub = context.hub;
@@ -183,11 +183,15 @@ fn text_message(
     }
 }
 
-/// Handles binary data of the viewer, which can only be a call of the service; returns an answer that needs no waiting.
-fn binary_message(context: &Context<'_>, calls: &mut Calls, bytes: &[u8]) -> Option<Message> {
+/// Handles a binary message of the viewer, which must be a service call; returns an answer that is available at once.
+fn binary_message(
+    context: &Context<'_>,
+    calls: &mut PendingCalls,
+    bytes: &[u8],
+) -> Option<Message> {
     let call = service_call(bytes)?;
     if call.service_id != SERVICE_ID {
-        let reason = "there is no such service";
+        let reason = "this service does not exist";
         return Some(Message::text(call_failure(&call, reason)));
     }
     match Command::parse(call.payload) {
@@ -203,7 +207,7 @@ fn binary_message(context: &Context<'_>, calls: &mut Calls, bytes: &[u8]) -> Opt
     }
 }
 
-/// The messages that report to a viewer how its command ended.
+/// Creates the messages that report the result of a command to a viewer.
 fn replies(hub: &Hub, reply_to: ReplyTo, answer: Answer) -> Vec<Message> {
     match reply_to {
         ReplyTo::Parameters(id) => {
@@ -230,7 +234,7 @@ fn replies(hub: &Hub, reply_to: ReplyTo, answer: Answer) -> Vec<Message> {
     }
 }
 
-/// The parameters as they are now, behind the reason for which they could not be set.
+/// Creates the message with the present parameters, preceded by the reason why they could not be set, if any.
 fn parameter_reply(hub: &Hub, id: Option<&str>, refused: Option<&str>) -> Vec<String> {
     let snapshot = hub.latest();
     let now = parameter_values(snapshot.as_ref(), &[], id);

@@ -31,14 +31,14 @@ pub enum Command {
     Up(UpArgs),
     /// Show the state of a running system; the exit code is 5 if a fault is latched.
     Status(SystemArgs),
-    /// Show a running system, or a log, on a page in the browser; viewers of the Foxglove protocol can connect too.
+    /// Show a running system, or a log, on a page in the browser; viewers of the Foxglove protocol can also connect.
     #[command(after_help = CODES)]
     View(ViewArgs),
     /// Put a running system into a mode.
     Mode(ModeArgs),
     /// Change stiffness and damping of a running system, along a ramp.
     Gains(GainsArgs),
-    /// Refine the model of a running system while its arm moves freely, or save what was learned.
+    /// Refine the model of a running system while its arm moves freely, or save the learned terms.
     #[command(after_help = LEARNING)]
     Learning(LearningArgs),
     /// Make a running system follow a trajectory, or the waypoints of a CSV file; the arm moves to its start first.
@@ -51,7 +51,7 @@ pub enum Command {
     Play(PlayArgs),
     /// Make a running system probe for contact; the arm moves to the start first.
     Probe {
-        /// The arm of the running system. Default: the one that its `supple up` was given, else wam4.
+        /// The arm of the running system. Default: the arm of its `supple up`, otherwise wam4.
         #[arg(long, value_name = "NAME|PATH")]
         arm: Option<String>,
         /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
@@ -73,13 +73,13 @@ pub enum Command {
         #[command(flatten)]
         system: SystemArgs,
     },
-    /// Confirm that the arm is in its home pose: after an emergency stop a WAM has lost its positions, and waits for this.
+    /// Confirm that the arm is in its home pose: after an emergency stop, a WAM has lost its position reference and waits for this.
     AtHome(AtHomeArgs),
-    /// List the motors of an arm on their bus, compare them with the arm's file and, asked explicitly, set registers; for
-    /// arms of Damiao motors.
+    /// List the motors of an arm on their bus, compare them with the arm's TOML and, on explicit request, set
+    /// registers; for arms with Damiao motors.
     #[command(after_help = CODES)]
     Motors(MotorsArgs),
-    /// Run many experiments on this machine or on a cluster; needs the Python package. A sweep that ended goes on.
+    /// Run many experiments on this machine or on a cluster; needs the Python package. An interrupted sweep continues.
     #[command(after_help = CODES)]
     Sweep(SweepArgs),
     /// Test simulated arms against process failures, faults, collisions and invalid requests, and compare each result
@@ -88,7 +88,7 @@ pub enum Command {
     Drill(DrillArgs),
     /// Clear the latched fault of a running system.
     Reset(SystemArgs),
-    /// Shut a running system down: the drives are set to idle first.
+    /// Shut a running system down; its controller first sets the drives to idle.
     Stop(SystemArgs),
     /// Check whether this machine can run an arm in real time.
     #[command(after_help = CODES)]
@@ -104,7 +104,7 @@ pub enum Command {
     },
     /// Write a manual page for every command, to read with `man`.
     Man {
-        /// Folder of the pages; it is created if necessary. `man -M FOLDER/..` finds those in a folder named man1.
+        /// Folder of the pages; it is created if necessary. `man -M FOLDER/..` finds pages in a folder named man1.
         folder: PathBuf,
         /// Print the names of the pages as JSON.
         #[arg(long)]
@@ -112,8 +112,8 @@ pub enum Command {
     },
 }
 
-/// After the help of `learning`.
-const LEARNING: &str = "Friction, payload, base tilt, torque offsets, torque constants and a smooth map of the rest over each \
+/// Text after the help of `learning`.
+const LEARNING: &str = "Friction, payload, base tilt, torque offsets, torque constants and a smooth map of the remaining torque over each \
 joint's angle are estimated from the prediction error of the torques, never from the tracking error. They stay within \
 bounds around the model, and nothing is learned in contact, in faults, in idle, gravity hold, float and joint impedance. \
 `supple status` shows them.
@@ -123,21 +123,21 @@ bounds around the model, and nothing is learned in contact, in faults, in idle, 
 /// Arguments of `learning`.
 #[derive(Clone, Debug, Args)]
 pub struct LearningArgs {
-    /// What to do.
+    /// Action.
     #[command(subcommand)]
     pub action: LearningAction,
 }
 
-/// What to do with learning.
+/// Action of `learning`.
 #[derive(Clone, Debug, Subcommand)]
 pub enum LearningAction {
-    /// Begin to learn, or go on.
+    /// Begin or continue to learn.
     On(SystemArgs),
-    /// Learn nothing more; what was learned stays in force.
+    /// Stop learning; the learned terms stay in effect.
     Off(SystemArgs),
-    /// Go back to the arm's description; learning stays on or off.
+    /// Discard the learned terms; learning stays on or off.
     Reset(SystemArgs),
-    /// Write the arm with what was learned; existing files are replaced.
+    /// Write the arm with the learned terms; existing files are replaced.
     Save {
         /// Folder for arm.toml and arm.urdf.
         folder: PathBuf,
@@ -165,7 +165,7 @@ pub enum PlantKind {
     Sim,
     /// A simulated arm on an emulated CAN bus: with motor pucks, safety module and pendant, or with Damiao motors.
     Emu,
-    /// An arm on a CAN bus. The operator activates a WAM at its pendant; Damiao motors are enabled without one.
+    /// An arm on a CAN bus. The operator activates a WAM on its pendant; the program enables Damiao motors.
     Can,
 }
 
@@ -181,19 +181,20 @@ pub struct MotorsArgs {
     /// What a URDF alone does not contain.
     #[command(flatten)]
     pub urdf: UrdfArgs,
-    /// can:NAME or unix:FOLDER; default: the bus of an emulated arm with the prefix.
+    /// The arm's bus, can:NAME or unix:FOLDER. Default: the bus of an emulated arm with the prefix.
     #[arg(long, value_name = "BUS")]
     pub bus: Option<Address>,
     /// Prefix of an emulated arm. Default: SUPPLE_PREFIX or `supple`.
     #[arg(long, value_name = "NAME")]
     pub prefix: Option<String>,
-    /// Only the motor with this id.
+    /// Use only the motor with this id.
     #[arg(long, value_name = "ID")]
     pub motor: Option<u16>,
     /// Read all registers.
     #[arg(long)]
     pub registers: bool,
-    /// Set a register by name or number, as in TIMEOUT=400; lost when the motor's supply is switched off. May be repeated.
+    /// Set a register by name or number, as in TIMEOUT=400; the value is lost when the motor's supply is switched off. May be
+    /// repeated.
     #[arg(long, value_name = "NAME=VALUE", requires = "motor")]
     pub set: Vec<String>,
     /// Clear the latched error.
@@ -224,13 +225,13 @@ pub struct DrillArgs {
     #[arg(long)]
     pub virtual_time: bool,
     /// Instead of the test cases, run this many random ones on a simulated arm: faults of random kinds at random times in
-    /// random tasks and poses, judged by energy and speed alone.
+    /// random tasks and poses, evaluated by energy and speed alone.
     #[arg(long, value_name = "COUNT", conflicts_with_all = ["plant", "only", "list", "virtual_time"])]
     pub random: Option<u64>,
     /// Seed of the first random case.
     #[arg(long, value_name = "SEED", default_value_t = 1, requires = "random")]
     pub seed: u64,
-    /// Random cases with the held joints released, as in the pose mode.
+    /// Run the random cases without held joints, as in the pose mode.
     #[arg(long, requires = "random")]
     pub all_joints_active: bool,
     /// Also write the result table as Markdown.
@@ -245,7 +246,7 @@ pub struct DrillArgs {
     /// What a URDF alone does not contain.
     #[command(flatten)]
     pub urdf: UrdfArgs,
-    /// Run without real-time priority and without locked memory.
+    /// Run without realtime priority, locked memory or processor binding.
     #[arg(long)]
     pub no_realtime: bool,
     /// Print the table as JSON.
@@ -256,7 +257,7 @@ pub struct DrillArgs {
 /// Arguments of `at-home`.
 #[derive(Clone, Debug, Args)]
 pub struct AtHomeArgs {
-    /// Do not ask.
+    /// Confirm without a question.
     #[arg(long)]
     pub yes: bool,
     /// System to use.
@@ -288,11 +289,11 @@ pub enum PendantAction {
 pub enum ModeName {
     /// No torque; the motors brake.
     Idle,
-    /// The model holds the arm's weight.
+    /// Gravity compensation with joint damping.
     GravityHold,
-    /// The model alone, for guiding the arm by hand.
+    /// Torques of the model alone, for guiding the arm by hand.
     Float,
-    /// Compliant joints: holds the pose softly, or moves to --target.
+    /// Compliant joints: hold the pose softly, or move to --target.
     JointImpedance,
 }
 
@@ -301,8 +302,8 @@ pub enum ModeName {
 pub struct ModeArgs {
     /// The mode.
     pub mode: ModeName,
-    /// Angles to move to in the joint-impedance mode, one per joint; those of held joints are not used. Default: the
-    /// present pose.
+    /// Angles to move to in the joint-impedance mode, one per joint; the angles of held joints are ignored.
+    /// Default: the present pose.
     #[arg(long, value_name = "RAD,...", value_delimiter = ',', allow_hyphen_values = true, value_parser = between(-100.0, 100.0))]
     pub target: Vec<f64>,
     /// Duration of the motion to --target.
@@ -326,7 +327,7 @@ pub enum UpTrajectory {
     Probe,
 }
 
-/// A trajectory of the paper, or a turn of the tip.
+/// A trajectory of the paper, or a rotation of the tip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum TrackTrajectory {
     /// Keep the position of the tip and turn it: --rotate, --angle-rad, --duration. Needs at least six joints that are
@@ -361,11 +362,11 @@ pub struct UpArgs {
     /// The arm's bus, can:NAME or unix:FOLDER. Default: can:can0 for `can`, private sockets for `emu`.
     #[arg(long, value_name = "BUS")]
     pub bus: Option<Address>,
-    /// Print the bus time of a cycle of this arm at the requested rate and end; the exit code shows whether it fits.
+    /// Print the bus time of a cycle of this arm and exit; the exit code shows whether the requested rate is possible.
     #[arg(long)]
     pub budget: bool,
-    /// Declare that the arm is in its home pose now; used if the motor pucks have lost their positions. An emulated
-    /// arm always starts there.
+    /// Declare that the arm is in its home pose now; used if the motor pucks have lost their position reference. An
+    /// emulated arm always starts in its home pose.
     #[arg(long)]
     pub zero_at_home: bool,
     /// Refine the model while the arm moves freely, as `supple learning on` does.
@@ -382,8 +383,8 @@ pub struct UpArgs {
     /// encoder-stuck:joint=1,at-s=2; see --help. May be repeated.
     #[arg(long, value_name = "SPEC", long_help = supple_plant::injection::HELP)]
     pub inject: Vec<Injection>,
-    /// Make an emulated Damiao motor or its bus misbehave, as in error:motor=2,code=B,at-s=3; `supple-emu --help` has the
-    /// kinds. May be repeated.
+    /// Make an emulated Damiao motor or its bus misbehave, as in error:motor=2,code=B,at-s=3; `supple-emu --help` lists
+    /// the kinds. May be repeated.
     #[arg(long, value_name = "SPEC")]
     pub misbehave: Vec<String>,
     /// The simulated or emulated arm.
@@ -413,10 +414,10 @@ pub struct UpArgs {
     /// Prefix of the new system. Default: SUPPLE_PREFIX or `supple`.
     #[arg(long, value_name = "NAME")]
     pub prefix: Option<String>,
-    /// Run without real-time priority and without locked memory.
+    /// Run without realtime priority, locked memory or processor binding.
     #[arg(long)]
     pub no_realtime: bool,
-    /// Print the summary as JSON; an error is then an object on standard output too.
+    /// Print the summary as JSON; an error is then also an object on standard output.
     #[arg(long)]
     pub json: bool,
 }
@@ -444,8 +445,8 @@ pub struct GainsArgs {
     /// unchanged.
     #[arg(long, conflicts_with_all = ["stiffness", "damping", "joint_stiffness", "joint_damping"], value_name = "N M S/RAD", value_delimiter = ',', allow_hyphen_values = true, value_parser = between(-1e3, 1e3))]
     pub rotational_damping: Vec<f64>,
-    /// Axes of the pose mode's stiffness and damping: of the base, or of the tip's reference, with which the matrices turn. Give
-    /// stiffness and damping together. Default with a matrix: base.
+    /// Axes of the pose mode's stiffness and damping: those of the base, or those of the tip's reference, with which the matrices
+    /// then rotate. Give stiffness and damping together. Default with a matrix: base.
     #[arg(long, value_enum, conflicts_with_all = ["joint_stiffness", "joint_damping"])]
     pub axes: Option<GainAxesName>,
     /// Duration of the ramp to the new gains.
@@ -465,7 +466,7 @@ pub enum GainAxesName {
     Tip,
 }
 
-/// What `track` follows.
+/// Target of `track`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum TrackTarget {
     /// A trajectory by its name.
@@ -495,7 +496,7 @@ impl core::str::FromStr for TrackTarget {
 pub struct TeachArgs {
     /// The recording, CSV; an existing file is replaced.
     pub file: PathBuf,
-    /// End after this many seconds. Default: with Ctrl-C, or when float ends.
+    /// End the recording after this many seconds. Default: end with Ctrl-C, or when float ends.
     #[arg(long = "for", value_name = "SECONDS", value_parser = between(0.1, 3600.0))]
     pub for_s: Option<f64>,
     /// System to use.
@@ -514,10 +515,10 @@ pub struct PlayArgs {
     /// Damping for all axes, or X,Y,Z. Default: unchanged.
     #[arg(long, value_name = "N S/M", value_delimiter = ',', value_parser = between(0.0, 1e6))]
     pub damping: Vec<f64>,
-    /// Speed relative to the recording. Where a limit needs it, the motion is slower.
+    /// Speed relative to the recording. The motion is slower where a limit requires it.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = between(0.1, 10.0))]
     pub speed: f64,
-    /// The arm of the running system. Default: the one that its `supple up` was given, else wam4.
+    /// The arm of the running system. Default: the arm of its `supple up`, otherwise wam4.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: Option<String>,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
@@ -534,25 +535,25 @@ pub struct PlayArgs {
 /// Arguments of `track`.
 #[derive(Clone, Debug, Args)]
 pub struct TrackArgs {
-    /// `sinusoid`, `arc` or `quadrant`, trajectories of the paper; `pose`, which keeps the tip's position and turns it:
+    /// Trajectory of the paper, `sinusoid`, `arc` or `quadrant`; `pose`, which keeps the tip's position and turns it:
     /// --rotate, --angle-rad, --duration, with at least six joints that are not held; or a CSV file with the columns
     /// x_m,y_m,z_m of waypoints in base axes, passed as fast as the limits allow, and time_s if the motion has times.
     #[arg(value_name = "NAME|FILE")]
     pub trajectory: TrackTarget,
-    /// Axis of a pose's turn in base coordinates, of any length but zero.
+    /// Rotation axis of `pose` in base coordinates, of any length except zero.
     #[arg(long, value_name = "X,Y,Z", value_delimiter = ',', allow_hyphen_values = true, required_if_eq("trajectory", "pose"), value_parser = between(-1e3, 1e3))]
     pub rotate: Vec<f64>,
-    /// Angle of the turn, at most half a turn.
+    /// Rotation angle, at most half a turn.
     #[arg(long, value_name = "RAD", requires = "rotate", default_value_t = 0.0, allow_negative_numbers = true, value_parser = between(-core::f64::consts::PI, core::f64::consts::PI))]
     pub angle_rad: f64,
-    /// Duration of the turn.
+    /// Duration of the rotation.
     #[arg(long = "duration", value_name = "SECONDS", requires = "rotate", default_value_t = 3.0, value_parser = between(1e-3, 3600.0))]
     pub duration_s: f64,
-    /// Speed factor relative to the paper or to the times in a file; for waypoints 1 is 0.8 of the limits of speed and
-    /// acceleration, the most.
+    /// Speed factor relative to the paper or to the times in a file; for waypoints, 1 is the maximum and means 0.8 of
+    /// the limits of speed and acceleration.
     #[arg(long, value_name = "FACTOR", default_value_t = 1.0, value_parser = between(1e-6, 1e6))]
     pub speed: f64,
-    /// The arm of the running system. Default: the one that its `supple up` was given, else wam4.
+    /// The arm of the running system. Default: the arm of its `supple up`, otherwise wam4.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: Option<String>,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.

@@ -1,6 +1,6 @@
 //! The operator's command line: complete systems as processes, commands to running systems, fault tests, logs.
 //!
-//! For a command that draws figures the process replaces itself with `supple-report` (exec), so that `supple` needs no
+//! For a command that draws figures, the process replaces itself with `supple-report` (exec), so that `supple` needs no
 //! plotting library.
 
 #![forbid(unsafe_code)]

@@ -1,4 +1,4 @@
-//! The command line.
+//! Entry point of the program `supple`.
 
 fn main() -> std::process::ExitCode {
     supple_realtime::run_on_supported_processor(supple::run)

@@ -1,4 +1,4 @@
-//! `supple man`: manual pages of every command, from the definition of the arguments.
+//! `supple man`: creates the manual page of every command from the definition of its arguments.
 
 use clap::Command;
 use std::fs;
@@ -34,7 +34,7 @@ pub fn run(mut command: Command, folder: &Path, as_json: bool) -> Result<(), Fai
     }
 }
 
-/// The page of a command, and those of its subcommands, as `supple-log-info.1`.
+/// Adds the pages of a command and of its subcommands, with names such as `supple-log-info.1`.
 fn add(command: &Command, name: &str, pages: &mut Vec<(String, Vec<u8>)>) -> std::io::Result<()> {
     let mut text = Vec::new();
     clap_mangen::Man::new(command.clone().display_name(name.to_owned()))

@@ -1,4 +1,4 @@
-//! `supple sweep`: many experiments, run by the Python package, which distributes them with Dask.
+//! `supple sweep`: runs many experiments with the Python package, which distributes them with Dask.
 //!
 //! This process replaces itself with the interpreter (exec). [`SweepArgs`] is parsed for validation, help, completions and manual
 //! pages; the Python program parses the same arguments again.
@@ -9,7 +9,8 @@ use std::path::PathBuf;
 use supple_cli::exit::Failure;
 use supple_cli::sibling::python;
 
-/// Starts the package's command with all arguments, `sweep` included; without the package it reports that, with exit code 10.
+/// Python program that starts the package's command with all arguments, including `sweep`; without the package it reports an
+/// error with exit code 10.
 const START: &str = "import sys
 try:
     from supple.__main__ import main
@@ -23,7 +24,7 @@ sys.exit(main())";
 pub struct SweepArgs {
     /// The experiments, TOML: arm, experiment, seed, number of repetitions, fixed and varied arguments; see docs/sweeps.md.
     pub spec: PathBuf,
-    /// Folder of the results, one Parquet file for each chunk of tasks. Tasks that are in it are not run again.
+    /// Folder of the results, one Parquet file for each chunk of tasks. Tasks whose results are in it are not run again.
     #[arg(long, value_name = "DIR", default_value = "out/sweep")]
     pub results: PathBuf,
     /// Number of worker processes on this machine. Default: one per processor.

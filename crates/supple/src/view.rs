@@ -1,4 +1,4 @@
-//! `supple view`: the live page, see `supple_view`.
+//! `supple view`: serves the live page, see `supple_view`.
 
 use crate::operate::arm_of;
 use clap::Args;
@@ -22,7 +22,7 @@ pub struct ViewArgs {
     /// Prefix of the system. Default: SUPPLE_PREFIX or `supple`.
     #[arg(long, value_name = "NAME", conflicts_with = "log")]
     pub prefix: Option<String>,
-    /// The arm of the running system. Default: the one that its `supple up` was given, else wam4. A log contains its arm.
+    /// The arm of the running system. Default: the arm of its `supple up`, otherwise wam4. A log contains its arm.
     #[arg(long, value_name = "NAME|PATH", conflicts_with = "log")]
     pub arm: Option<String>,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
@@ -34,7 +34,7 @@ pub struct ViewArgs {
     /// Draw a block, its top face at this height above the base frame (m).
     #[arg(long, value_name = "M", allow_negative_numbers = true, value_parser = between(-10.0, 10.0))]
     pub block_m: Option<f64>,
-    /// Port on 127.0.0.1. Default: a free one.
+    /// Port on 127.0.0.1. Default: a free port.
     #[arg(
         long,
         value_name = "PORT",
@@ -42,14 +42,14 @@ pub struct ViewArgs {
         hide_default_value = true
     )]
     pub port: u16,
-    /// Accept no requests: the page shows, it does not command.
+    /// Accept no requests: the page only shows data.
     #[arg(long)]
     pub read_only: bool,
-    /// Also accept the page of another viewer, such as Lichtblick at http://localhost:8080, if it has the URL of this
-    /// one. May be repeated.
+    /// Also accept the page of another viewer, such as Lichtblick at http://localhost:8080, if it has the URL of
+    /// this page. May be repeated.
     #[arg(long, value_name = "ORIGIN")]
     pub allow_origin: Vec<String>,
-    /// End with the process that started this one.
+    /// End this process when the process that started it ends.
     #[arg(long, hide = true)]
     pub supervised: bool,
     /// Print the URLs as JSON.
@@ -96,7 +96,7 @@ fn print(addresses: &Addresses, json: bool) -> Result<(), Failure> {
     }
     print_line(&format!("page      {}", addresses.url))?;
     print_line(&format!("foxglove  {}", addresses.foxglove_url))?;
-    print_status("the URLs contain a secret: whoever has them commands the arm");
+    print_status("the URLs contain a secret: everyone who has them can command the arm");
     Ok(())
 }
 

@@ -13,7 +13,7 @@ from typing import Any
 from supple._spec import Spec, SpecError
 from supple._sweep import Sweep, sweep
 
-# Exit codes, as those of `supple`.
+# Exit codes, the same as those of the program `supple`.
 _USAGE, _EXPERIMENT, _FILE, _INTERRUPTED = 2, 4, 6, 130
 
 
@@ -38,7 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ImportError as error:
         return _fail(f"{error}; a sweep needs: pip install 'supple[cluster]'", _FILE)
     except KeyboardInterrupt:
-        return _fail(f"interrupted; what is finished is in {options.results}: the same command goes on", _INTERRUPTED)
+        return _fail(f"interrupted; the finished tasks are in {options.results}: repeat the command to run the others", _INTERRUPTED)
     _print(found, options)
     return _EXPERIMENT if found.failures else 0
 
@@ -67,7 +67,7 @@ def _run(spec: Spec, options: argparse.Namespace) -> Sweep[dict[str, object], di
 
 
 def _progress() -> Callable[[int, int], None] | bool:
-    """A bar on a terminal with tqdm; otherwise a line for each tenth."""
+    """Returns a progress bar (tqdm, on a terminal), or a function that prints a line after each tenth of the tasks."""
     if sys.stderr.isatty():
         try:
             import tqdm  # noqa: F401

@@ -1,4 +1,4 @@
-"""What a notebook shows of an arm; `Arm._repr_html_` of the native module calls it."""
+"""HTML table of an arm for notebooks; `Arm._repr_html_` of the native module calls `arm_table`."""
 
 from __future__ import annotations
 

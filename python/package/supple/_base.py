@@ -26,9 +26,9 @@ class BaseParameters:
     names: tuple[str, ...]
     """Each base parameter as text, such as ``"Izz1 + Iyy2 - 0.55 mcx2"``, (rank,)."""
     values: Array
-    """Their values for this arm, (rank,), SI units."""
+    """Values of the base parameters for this arm, (rank,), SI units."""
     null_space: tuple[str, ...]
-    """Null space as text: directions in which the parameters can change without a change of torque."""
+    """Null space as text: directions in which the parameters can change without changing any torque."""
     columns: tuple[str, ...]
     """Names of the columns: ten for each link, then the rotors; links and joints are counted from 0."""
     independent: NDArray[np.intp]

@@ -1,4 +1,4 @@
-"""Arguments of functions: every error names the argument, what it takes and what it got.
+"""Checks of arguments: every error names the argument, the expected value and the given value.
 
 Of the wrong type is a TypeError, of the wrong value a ValueError. Neither text nor truth values are numbers.
 """
@@ -27,14 +27,14 @@ _NO_NUMBER = (str, bytes, bytearray, bool, np.bool_)
 
 
 def wrong(name: str, expected: str, value: object) -> TypeError:
-    """The error of an argument of the wrong type."""
-    # On one line: the text of an array has several.
+    """Returns the error for an argument of the wrong type."""
+    # Joins the lines: the text of an array has several.
     found = " ".join(_SHORT.repr(value).split())
     return TypeError(f"{name}: expected {expected}, got {found}")
 
 
 def number(name: str, value: float, *, positive: bool = False, signed: bool = False) -> float:
-    """A finite number, zero or more; with ``positive`` more than zero, with ``signed`` any."""
+    """Returns a finite number of zero or more; with ``positive`` above zero, with ``signed`` of either sign."""
     if isinstance(value, _NO_NUMBER) or getattr(value, "ndim", 0) != 0:
         raise wrong(name, "a number", value)
     try:
@@ -50,7 +50,7 @@ def number(name: str, value: float, *, positive: bool = False, signed: bool = Fa
 
 
 def integer(name: str, value: int, *, least: int = 0, limit: int = 2**64) -> int:
-    """An integer, ``least`` or more and below ``limit``."""
+    """Returns an integer of ``least`` or more and below ``limit``."""
     if isinstance(value, _NO_NUMBER):
         raise wrong(name, "an integer", value)
     try:
@@ -65,7 +65,7 @@ def integer(name: str, value: int, *, least: int = 0, limit: int = 2**64) -> int
 
 
 def iterable(name: str, values: Iterable[T]) -> Iterable[T]:
-    """Something that can be iterated over."""
+    """Returns the values after checking that they can be iterated over."""
     try:
         iter(values)
     except TypeError:
@@ -74,14 +74,14 @@ def iterable(name: str, values: Iterable[T]) -> Iterable[T]:
 
 
 def integers(name: str, values: Iterable[int]) -> list[int]:
-    """Integers, zero or more each."""
+    """Returns integers, each zero or more."""
     if isinstance(values, (str, bytes)):
         raise wrong(name, "integers", values)
     return [integer(f"{name}[{i}]", value) for i, value in enumerate(iterable(name, values))]
 
 
 def array(name: str, values: ArrayLike, shape: tuple[int, ...] | None = None) -> NDArray[np.float64]:
-    """Numbers as an array, with ``shape`` of this one."""
+    """Returns the numbers as an array; ``shape``, if given, is the required shape."""
     try:
         found = np.asarray(values)
     except ValueError as error:
@@ -94,28 +94,28 @@ def array(name: str, values: ArrayLike, shape: tuple[int, ...] | None = None) ->
 
 
 def named_numbers(name: str, values: Mapping[str, float]) -> dict[str, float]:
-    """Finite numbers by name, of either sign."""
+    """Returns finite numbers of either sign by their names."""
     if not isinstance(values, Mapping):
         raise wrong(name, "a mapping of names to numbers", values)
     return {text(name, key): number(f"{name}[{key!r}]", value, signed=True) for key, value in values.items()}
 
 
 def flag(name: str, value: bool) -> bool:
-    """True or False."""
+    """Returns True or False."""
     if not isinstance(value, (bool, np.bool_)):
         raise wrong(name, "True or False", value)
     return bool(value)
 
 
 def text(name: str, value: str) -> str:
-    """Text."""
+    """Returns a text."""
     if not isinstance(value, str):
         raise wrong(name, "text", value)
     return value
 
 
 def path(name: str, value: str | os.PathLike[str], expected: str = "a path") -> str:
-    """A path as text."""
+    """Returns a path as text."""
     try:
         found = os.fspath(value)
     except TypeError:
@@ -126,19 +126,19 @@ def path(name: str, value: str | os.PathLike[str], expected: str = "a path") -> 
 
 
 def instance(name: str, value: T, kind: type[T]) -> T:
-    """An object of a class of the package."""
+    """Returns an object of the class ``kind``."""
     if not isinstance(value, kind):
         raise wrong(name, f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}", value)
     return value
 
 
 def function(name: str, value: Callable[P, R], expected: str = "a callable") -> Callable[P, R]:
-    """Something that can be called."""
+    """Returns a callable."""
     if not callable(value):
         raise wrong(name, expected, value)
     return value
 
 
 def arm(name: str, value: _native.Arm) -> _native.Arm:
-    """An arm."""
+    """Returns an arm."""
     return instance(name, value, _native.Arm)

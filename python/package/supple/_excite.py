@@ -33,9 +33,9 @@ class Excitation:
     qdd: Array
     """Accelerations, (samples, N) (rad/s^2)."""
     rank: int
-    """Rank of its base regressor."""
+    """Rank of the base regressor along this trajectory."""
     condition: float
-    """Condition number of its base regressor, columns scaled to unit length."""
+    """Condition number of the base regressor along this trajectory, columns scaled to unit length."""
     history: Array
     """Best value of the criterion after each candidate, (candidates,)."""
     _series: dict[str, Any] = field(repr=False)

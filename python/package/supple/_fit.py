@@ -40,7 +40,7 @@ class Payload:
 
     @staticmethod
     def ball(mass_kg: float, radius_m: float, com_m: ArrayLike) -> Payload:
-        """A solid ball."""
+        """Returns a payload that is a solid ball."""
         return Payload(mass_kg, com_m, 0.4 * mass_kg * radius_m**2 * np.eye(3))
 
     def __repr__(self) -> str:
@@ -94,9 +94,9 @@ class Fit:
     base_parameters: Array
     """Values of the combinations that the data determine, (rank,), SI units."""
     std: Array
-    """Standard deviation of each, (rank,)."""
+    """Standard deviations of ``base_parameters``, (rank,)."""
     null_space: tuple[str, ...]
-    """Undetermined directions, as text; there the nominal arm determines the values."""
+    """Undetermined directions, as text; the nominal arm determines the values in these directions."""
     condition: float
     """Condition number of the independent columns, each scaled to unit length."""
     moving: tuple[int, ...]
@@ -112,7 +112,7 @@ class Fit:
     choices: tuple[tuple[str, str], ...]
     """Choices made by cross-validation, each with its table of held-out errors."""
     warnings: tuple[str, ...]
-    """Warnings."""
+    """Warnings about the data and the fit."""
 
     @property
     def rank(self) -> int:

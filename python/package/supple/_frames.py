@@ -17,7 +17,7 @@ AXES = ("x", "y", "z")
 
 
 def columns_of(result: Any) -> dict[str, np.ndarray]:
-    """Every array of a result with one row per sample: its fields, and those of its mappings of such arrays."""
+    """Returns every array with one row per sample: fields of the result, and entries of its mappings."""
     rows = len(result.t)
     found: dict[str, np.ndarray] = {}
     for field in fields(result):
@@ -30,14 +30,14 @@ def columns_of(result: Any) -> dict[str, np.ndarray]:
 
 
 def part_names(column: np.ndarray, name: str) -> list[str]:
-    """Names of the parts of a column: of axes for vectors in base axes, numbers for joints."""
+    """Returns the names of a column's parts: x, y, z for vectors in base axes, numbers for joints."""
     width = column.shape[1]
     is_vector = width == 3 and name.endswith(("_m", "_n", "_m_per_s", "_n_per_m", "_n_s_per_m", "_m_per_s2"))
     return list(AXES) if is_vector else [str(joint) for joint in range(width)]
 
 
 def to_pandas(result: Any) -> pd.DataFrame:
-    """One row per sample, indexed by ``t``; columns of several numbers as ``q.0`` or ``tip_position_m.x``."""
+    """Returns one row per sample, indexed by ``t``; parts of a column are named ``q.0`` or ``tip_position_m.x``."""
     import pandas as pd
 
     flat: dict[str, np.ndarray] = {}
@@ -53,7 +53,7 @@ def to_pandas(result: Any) -> pd.DataFrame:
 
 
 def to_xarray(result: Any) -> xr.Dataset:
-    """One variable per column, over ``t`` and ``joint`` or ``axis``."""
+    """Returns one variable per column, over ``t`` and ``joint`` or ``axis``."""
     import xarray as xr
 
     variables: dict[str, Any] = {}
@@ -98,12 +98,12 @@ class Tabular:
 
 
 def shape(column: np.ndarray) -> str:
-    """Shape as text."""
+    """Returns a column's shape as text."""
     return " x ".join(str(size) for size in column.shape)
 
 
 def text_range(column: np.ndarray) -> str:
-    """Least and greatest value as text; of names the distinct ones."""
+    """Returns the least and greatest value as text; for a column of names, the distinct names."""
     if column.dtype.kind in "US":
         return ", ".join(dict.fromkeys(column.tolist()))
     if column.size == 0:
@@ -114,7 +114,7 @@ def text_range(column: np.ndarray) -> str:
 
 
 def table(caption: str, head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
-    """An HTML table."""
+    """Returns an HTML table."""
     cells = "".join(f"<th>{escape(str(cell))}</th>" for cell in head)
     body = "".join(
         "<tr>" + "".join(f"<td>{escape(str(cell))}</td>" for cell in row) + "</tr>" for row in rows

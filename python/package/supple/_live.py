@@ -22,7 +22,7 @@ __all__ = ["Answer", "Refused", "SetPoints", "State", "States", "System", "conne
 
 
 class Refused(RuntimeError):
-    """The controller refused a request, and why; nothing has changed."""
+    """The controller refused a request; the message gives the reason. The controller's state has not changed."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,9 @@ class Answer:
     """The controller's answer to a request that it has accepted or, with ``at_cycle``, queued."""
 
     cycle: int
-    """Cycle in which it was received."""
+    """Cycle in which the controller received the request."""
     mode: str
-    """Mode when it answered."""
+    """Mode of the controller when it answered."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class State:
     tip_position_m: Array
     """Tip, (3,) (m)."""
     tip_velocity_m_per_s: Array
-    """Its velocity, (3,) (m/s)."""
+    """Velocity of the tip, (3,) (m/s)."""
     reference_position_m: Array | None
     """Reference of the tip, (3,) (m); ``None`` if there is none."""
     external_force_n: Array
@@ -78,7 +78,7 @@ class State:
 
 @dataclass(frozen=True, eq=False)
 class States(Tabular):
-    """Cycles one after another, one row each."""
+    """Consecutive cycles, one row for each."""
 
     cycle: NDArray[np.int64]
     """Numbers of the cycles, (cycles,). A gap means that some did not reach this connection."""
@@ -257,7 +257,7 @@ class System:
         return f"<System {self.prefix!r} of {self.dof} joints at {rate}>"
 
     def close(self) -> None:
-        """End the connection. The arm goes on with what it does."""
+        """End the connection. The controller stays in its mode and the arm continues its motion."""
         self._native.close()
 
     @property
@@ -285,11 +285,11 @@ class System:
         """Whether time passes by itself; in a simulation of :func:`simulated` it passes while a call waits."""
         return isinstance(self._native, _native.Connection)
 
-    # What it does
+    # State of the controller
 
     @property
     def state(self) -> State:
-        """The newest cycle that has come."""
+        """The newest cycle that this connection has received."""
         row = self._native.latest()
         columns = {name: value[0] for name, value in row.items() if isinstance(value, np.ndarray)}
         return State(
@@ -311,7 +311,7 @@ class System:
         )
 
     def record(self, duration_s: float) -> States:
-        """Wait, and return every cycle of this time.
+        """Wait for a duration, and return every cycle that was received in it.
 
         Parameters
         ----------
@@ -335,7 +335,7 @@ class System:
         return _states(self._native.read(begin), self.period_s)
 
     def recent(self, duration_s: float = 1.0) -> States:
-        """The last cycles that have come, at once.
+        """Return the last received cycles without waiting.
 
         Parameters
         ----------
@@ -347,7 +347,7 @@ class System:
         return _states(self._native.read(begin), self.period_s)
 
     def stream(self, every_s: float = 0.05) -> Iterator[States]:
-        """Blocks of cycles as they come, until no more come or the loop is left.
+        """Yield blocks of cycles as they are received, until telemetry ends or the caller leaves the loop.
 
         There is no gap as long as each block is used within the 8192 cycles that are kept.
 
@@ -368,7 +368,7 @@ class System:
             yield _states(block, self.period_s)
 
     def wait(self, duration_s: float) -> State:
-        """Wait for a time on the controller's clock, and return the state then.
+        """Wait for a duration on the controller's clock, and return the state at its end.
 
         Parameters
         ----------
@@ -431,21 +431,21 @@ class System:
         return Answer(cycle, mode)
 
     def idle(self) -> Answer:
-        """Take the torque off. It bypasses the queue of requests, and works from a watching connection too."""
+        """Request idle: zero torque. The request bypasses the queue, and a watching connection may send it too."""
         cycle, mode = self._native.idle()
         self._see(cycle)
         return Answer(cycle, mode)
 
     def gravity_hold(self) -> Answer:
-        """Carry the arm's weight and damp its joints."""
+        """Compensate gravity and damp the joints."""
         return self.request("gravity_hold")
 
     def float_mode(self) -> Answer:
-        """Carry the arm's weight alone, for guiding by hand."""
+        """Compensate gravity without damping, so that a person can guide the arm by hand."""
         return self.request("float")
 
     def reset(self) -> Answer:
-        """Leave a fault."""
+        """Clear the latched fault."""
         return self.request("reset")
 
     def move(self, target_rad: ArrayLike, duration_s: float, *, wait: bool = True) -> Answer:
@@ -546,7 +546,7 @@ class System:
         return self.request("gain_matrices", [1.0, *stiffness, *damping, _axes_code(axes), ramp_s])
 
     def turn(self, axis: ArrayLike, angle_rad: float, duration_s: float, *, wait: bool = True) -> Answer:
-        """Turn the tip about an axis while its position stays, and hold that pose. Needs six active joints.
+        """Turn the tip about an axis at constant position, and hold the final pose. Needs six active joints.
 
         Parameters
         ----------
@@ -594,11 +594,11 @@ class System:
         return self.request("joint_gains", [*values, ramp_s])
 
     def hold(self) -> Answer:
-        """Hold the tip where its reference is, with the stiffness in force."""
+        """Hold the tip at its present reference, with the present stiffness."""
         return self.request("track", self._reference_m(), trajectory="hold")
 
     def line(self, to_m: ArrayLike, duration_s: float, *, wait: bool = True) -> Answer:
-        """Move the tip on a straight line from its reference, or from where it is.
+        """Move the tip on a straight line from its reference, or from its position if there is no reference.
 
         Parameters
         ----------
@@ -658,13 +658,13 @@ class System:
         return SetPoints(self, rate_hz, lead_s)
 
     def _see(self, cycle: int) -> None:
-        """Wait briefly for the telemetry of a cycle, which may come after the reply: the state is then after the request."""
+        """Waits briefly for the telemetry of a cycle: it may arrive after the reply, and ``state`` must include the request."""
         native = self._native
         while native.cycle() < cycle and native.wait(native.received(), 0.2):
             pass
 
     def _reference_m(self) -> Array:
-        """Where the tip's reference is, or the tip without one (m)."""
+        """Returns the tip's reference position, or the tip position if there is no reference (m)."""
         now = self.state
         return now.tip_position_m if now.reference_position_m is None else now.reference_position_m
 
@@ -759,7 +759,7 @@ class SetPoints:
             self._wait_until(at_cycle - lead)
         late = native.cycle() + 1 - at_cycle
         if late >= 0:
-            # The caller was away for longer than the lead: the reference rests or is about to.
+            # The caller sent nothing for longer than the lead: the reference rests, or soon will.
             self._begin += late + lead
             at_cycle += late + lead
             self._last.clear()
@@ -769,13 +769,13 @@ class SetPoints:
         self._sent += 1
 
     def wait(self) -> State:
-        """Wait until the next set-point is due to be sent, and return the state then."""
+        """Wait until the next set-point is due, and return the state at that time."""
         period_s = self._system.period_s
         self._wait_until(self._begin + round(self.time_s / period_s) - round(self._lead_s / period_s))
         return self._system.state
 
     def finish(self) -> State:
-        """Wait until the reference rests, and return the state then."""
+        """Wait until the reference rests, and return the state at that time."""
         state = self._system.wait(self._lead_s)
         self._raise_refusal()
         while state.mode == "track" and state.columns["reference_velocity_m_per_s"].any():
@@ -784,7 +784,7 @@ class SetPoints:
         return state
 
     def _estimate(self, position: Array) -> Array:
-        """Velocity at the last of up to three equally spaced points; zero at the first."""
+        """Returns the velocity at the newest of up to three equally spaced points; zero after the first point."""
         if not self._last:
             return np.zeros(3)
         h = self._interval_s
@@ -799,7 +799,7 @@ class SetPoints:
             missing = cycle - now
             if missing <= 0:
                 return
-            # Sleep for most of the wait as long as cycles come; then wait for each.
+            # Sleep for most of the wait while cycles arrive; then wait for each cycle.
             if self._system.is_live and missing * self._system.period_s > 0.02 and now != slept_at:
                 slept_at = now
                 time.sleep(0.5 * missing * self._system.period_s)
@@ -826,7 +826,7 @@ def _axes(name: str, given: ArrayLike | None, otherwise: Array | None) -> Array:
 
 
 def _symmetric(name: str, given: ArrayLike | None) -> list[float]:
-    """Entries xx, yy, zz, yz, zx, xy of a symmetric matrix, or of a diagonal one from a number or three."""
+    """Returns xx, yy, zz, yz, zx, xy of a symmetric matrix; one number or three numbers give a diagonal matrix."""
     array = _check.array(name, np.nan if given is None else given)
     if array.ndim == 0:
         array = np.full(3, array)

@@ -35,7 +35,7 @@ class Truth(Tabular):
     tip_position_m: Array
     """Tip, base axes, (samples, 3) (m)."""
     tip_velocity_m_per_s: Array
-    """Its velocity, base axes, (samples, 3) (m/s)."""
+    """Velocity of the tip, base axes, (samples, 3) (m/s)."""
     contact_force_n: Array
     """Contact force on the tip, unfiltered, base axes, (samples, 3) (N)."""
 
@@ -65,15 +65,15 @@ class Log(Tabular):
     mode: NDArray[np.str_]
     """Mode of the controller, (samples,): ``"track"``, ``"gravity_hold"`` .."""
     tip_position_m: Array
-    """Tip by the model, base axes, (samples, 3) (m)."""
+    """Tip position, computed with the model, base axes, (samples, 3) (m)."""
     tip_velocity_m_per_s: Array
-    """Its velocity, base axes, (samples, 3) (m/s)."""
+    """Velocity of the tip, base axes, (samples, 3) (m/s)."""
     has_reference: NDArray[np.bool_]
-    """Whether a tip trajectory runs, (samples,)."""
+    """Whether the controller follows a tip trajectory, (samples,)."""
     reference_position_m: Array
     """Reference position of the tip, base axes, (samples, 3) (m); zero without a reference."""
     reference_velocity_m_per_s: Array
-    """Its velocity, base axes, (samples, 3) (m/s); zero without a reference."""
+    """Velocity of the tip's reference, base axes, (samples, 3) (m/s); zero without a reference."""
     has_tip_force: NDArray[np.bool_]
     """Whether a force sensor reported, (samples,)."""
     tip_force_n: Array
@@ -93,7 +93,7 @@ class Log(Tabular):
     torques: Mapping[str, Array]
     """Torque terms by name, (samples, N) each (N m); their sum, once limited, is ``tau``."""
     columns: Mapping[str, Array]
-    """Every number of a row by its name in the log, (samples,) or (samples, N or 3); codes and flags as numbers."""
+    """Every log field by name, (samples,) or (samples, N or 3); codes and flags are numbers."""
     faults: tuple[tuple[float, str], ...]
     """Time (s) and text of every latched fault."""
     timing: Mapping[str, Array]
@@ -154,7 +154,7 @@ def read_log(path: str | PathLike[str]) -> Log:
     own = {field.name for field in fields(Log)} & steps.keys()
     columns: dict[str, Any] = {name: steps[name] for name in own}
     columns |= {name: steps[of] for name, of in names.items()} | flags
-    # In the log a number, here its name.
+    # The log has a number, the result its name.
     columns["mode"] = np.array(content["modes"], dtype=np.str_)
     return Log(
         arm=content["arm"],

@@ -1,4 +1,4 @@
-"""Logs as passed by the caller: one, or several as lists."""
+"""Logs as the caller passes them: one log, or lists of the columns of several logs."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ import numpy as np
 
 
 def log_input(t: Any, q: Any, tau: Any, qd: Any, qdd: Any) -> dict[str, Any]:
-    """One log by the names of its columns."""
+    """Returns the columns of one log by name."""
     return {"t": t, "q": q, "tau": tau, "qd": qd, "qdd": qdd}
 
 
 def log_inputs(t: Any, q: Any, tau: Any, qd: Any, qdd: Any) -> list[dict[str, Any]]:
-    """One log, or several given as lists: then the entries of ``t`` are arrays themselves."""
+    """Returns one log, or several if the columns are lists: the entries of ``t`` are then arrays."""
     several = isinstance(t, (list, tuple)) and len(t) > 0 and all(np.ndim(part) > 0 for part in t)
     if not several:
         return [log_input(t, q, tau, qd, qdd)]

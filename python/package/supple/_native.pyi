@@ -766,7 +766,7 @@ class Connection:
         """Sends a request by its name and values, as logs have them; returns the cycle and the mode after it."""
 
     def idle(self) -> tuple[int, str]:
-        """Requests idle, over a socket of its own, so that it passes every queue."""
+        """Requests idle, over a separate socket, so that the request bypasses every queue."""
 
     def set_point(
         self,
@@ -867,10 +867,10 @@ def read_log(path: str) -> dict[str, Any]:
     """Reads a log: the arm, its metadata and its columns."""
 
 def realistic_set(arm: Arm) -> str:
-    """The name of the realistic set of `arm`."""
+    """Returns the name of the realistic set of `arm`."""
 
 def plant_options(name: str) -> dict[str, float]:
-    """The set of options `name` as a dictionary."""
+    """Returns the set of options `name` as a dictionary."""
 
 def simulate(arm: Arm, model: Arm | None, options: dict[str, Any]) -> dict[str, Any]:
     """Runs an experiment in virtual time. `model` is the controller's model of the arm; without it, the controller
@@ -885,7 +885,7 @@ def identify(
 def base_parameters(
     arm: Arm, states: list[_Array], rotor: bool, moving: list[int]
 ) -> dict[str, Any]:
-    """Base parameters of the regressor stacked over given states."""
+    """Computes the base parameters of the regressor stacked over given states."""
 
 def design_excitation(
     arm: Arm, request: dict[str, Any], progress: Callable[[int, float], object] | None
@@ -910,7 +910,7 @@ def payload(fit: Fit, logs: list[dict[str, Any]], guess: dict[str, Any]) -> dict
 def torque_scale(
     fit: Fit, logs: list[dict[str, Any]], known: dict[str, Any]
 ) -> list[float | None]:
-    """Ratio of true to logged torque of each moving joint; `None` if the known payload adds too little torque."""
+    """Returns the ratio of true to logged torque of each moving joint; `None` if the known payload adds too little torque."""
 
 def ripple(
     fit: Fit,
@@ -919,4 +919,4 @@ def ripple(
     fast_rad_per_s: float,
     cutoff_hz: float,
 ) -> list[list[tuple[int, float, float]]]:
-    """Harmonic, sine and cosine amplitude of every line of each motor."""
+    """Returns harmonic, sine and cosine amplitude of every line of each motor."""

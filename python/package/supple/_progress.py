@@ -1,4 +1,4 @@
-"""Progress bars with tqdm, where it is installed and somebody watches."""
+"""Progress bars, shown if tqdm is installed and the output is a terminal or a notebook."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 
 def bar(description: str, unit: str = "task") -> Callable[[int, int], None]:
-    """A function ``progress(done, total)`` that shows a bar in a terminal or a notebook.
+    """Returns a function ``progress(done, total)`` that shows a bar in a terminal or a notebook.
 
     Raises
     ------
@@ -20,7 +20,7 @@ def bar(description: str, unit: str = "task") -> Callable[[int, int], None]:
 
     def progress(done: int, total: int) -> None:
         if not shown:
-            # `disable=None`: quiet where the output is no terminal.
+            # `disable=None` shows no bar if the output is no terminal.
             shown.append(tqdm(total=total, desc=description, unit=unit, disable=None))
         shown[0].update(done - shown[0].n)
         if done >= total:

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-# A part is written after this many rows, or this many seconds: so much is done again if the client is killed.
+# A part is written after this many rows or seconds: a killed client loses, and must repeat, at most as many.
 _ROWS = 500
 _SECONDS = 10.0
 # Columns that every part has.
@@ -36,7 +36,7 @@ class Results:
         self._folder.mkdir(parents=True, exist_ok=True)
 
     def finished(self, parameters: Mapping[int, object]) -> dict[int, Any]:
-        """Results by seed of the tasks that are done; failed ones are not.
+        """Returns the results of finished tasks by seed; failed tasks are not finished.
 
         Raises
         ------
@@ -92,7 +92,7 @@ class Results:
             self.write()
 
     def write(self) -> None:
-        """Writes what is pending."""
+        """Writes the pending rows as a new part."""
         self._written_s = time.monotonic()
         if not self._pending:
             return
@@ -112,7 +112,7 @@ class Results:
 
 
 def _array(pyarrow: Any, name: str, values: list[Any]) -> Any:
-    """A column; text where all values are absent or where their types differ."""
+    """Returns a column; its type is text if all values are absent or their types differ."""
     if name == "seed":
         return pyarrow.array(values, pyarrow.int64())
     try:
@@ -123,18 +123,18 @@ def _array(pyarrow: Any, name: str, values: list[Any]) -> Any:
 
 
 def _same(stored: object, value: object) -> bool:
-    """Whether a stored parameter is this one; in a column of mixed types it is text."""
+    """Returns whether a stored parameter equals ``value``; a column of mixed types stores text."""
     return stored == value or str(stored) == str(value)
 
 
 def _columns(name: str, value: object) -> dict[str, Any]:
-    """A parameter or a result as columns."""
+    """Returns a parameter or a result as columns."""
     values = {str(key): item for key, item in value.items()} if isinstance(value, Mapping) else {name: value}
     return {key: _plain(item) for key, item in values.items()}
 
 
 def _plain(value: Any) -> Any:
-    """Numbers, text and lists of them as they are; scalars and arrays of NumPy as those; anything else as text."""
+    """Returns numbers, text and lists unchanged, NumPy scalars and arrays converted to them, other values as text."""
     if hasattr(value, "tolist"):
         value = value.tolist()
     if isinstance(value, (list, tuple)):

@@ -14,19 +14,19 @@ from typing import Any
 from supple import _native
 from supple._simulate import EXPERIMENTS, simulate
 
-# Arguments of simulate that a spec gives elsewhere, or that are not plain values.
+# Arguments of simulate that are not plain values, or that a spec gives under other keys.
 _ELSEWHERE = ("arm", "experiment", "seed", "model")
 _ARGUMENTS = tuple(name for name in inspect.signature(simulate).parameters if name not in _ELSEWHERE)
 _KEYS = ("arm", "experiment", "seed", "repetitions", "fixed", "varied")
 
 
 class SpecError(Exception):
-    """A spec that cannot be run; the message names file, key and remedy."""
+    """Error of an invalid spec; the message names file, key and remedy."""
 
 
 @dataclass(frozen=True)
 class Spec:
-    """Every combination of the varied arguments, ``repetitions`` times, each with a seed of its own."""
+    """A sweep over every combination of the varied arguments, ``repetitions`` times, each with its own seed."""
 
     arm: str = "wam4"
     """Built-in arm, or path of an arm's TOML, folder or URDF, which every worker must be able to read."""
@@ -37,7 +37,7 @@ class Spec:
     repetitions: int = 1
     """Tasks of each combination."""
     fixed: dict[str, Any] = field(default_factory=dict)
-    """Arguments of :func:`supple.simulate` that all tasks have."""
+    """Arguments of :func:`supple.simulate` that are the same for all tasks."""
     varied: dict[str, list[Any]] = field(default_factory=dict)
     """Lists of values of further arguments."""
 
@@ -76,13 +76,13 @@ class Spec:
         return spec
 
     def tasks(self) -> list[dict[str, Any]]:
-        """The varied arguments of each task. More repetitions add tasks at the end, so that a sweep can be prolonged."""
+        """Returns the varied arguments of each task. More repetitions add tasks at the end, which extends a sweep."""
         combinations = [dict(zip(self.varied, values, strict=True)) for values in itertools.product(*self.varied.values())]
         return combinations * self.repetitions
 
     @property
     def run(self) -> partial[dict[str, Any]]:
-        """The function of a task: ``run(varied, seed)``."""
+        """Returns the function ``run(varied, seed)`` that runs one task."""
         return partial(_run, self.arm, self.experiment, self.fixed)
 
 
@@ -96,7 +96,7 @@ _arms: dict[str, _native.Arm] = {}
 
 
 def _arm(name: str) -> _native.Arm:
-    """An arm, loaded once in each worker."""
+    """Returns an arm, loaded once in each worker."""
     if name not in _arms:
         is_urdf = name.lower().endswith((".urdf", ".xml"))
         _arms[name] = _native.Arm.from_urdf(name).completed() if is_urdf else _native.Arm.load(name)

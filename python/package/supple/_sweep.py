@@ -30,11 +30,11 @@ class Failed(Generic[P]):
     """A task of :func:`sweep` that raised an exception."""
 
     parameter: P
-    """Its parameter."""
+    """Parameter of the task."""
     seed: int
-    """Its seed."""
+    """Seed of the task."""
     error: str
-    """The exception, with its type."""
+    """Type and message of the exception."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Sweep(Sequence[R], Generic[P, R]):
     results: tuple[R, ...]
     """Result of each task."""
     failures: tuple[Failed[P], ...] = ()
-    """Tasks that failed, which are not among the above; only with ``results``, otherwise the first one is raised."""
+    """Failed tasks, only with ``results``; the lists above do not contain them. Otherwise the first failure is raised."""
 
     @overload
     def __getitem__(self, index: int) -> R: ...
@@ -213,7 +213,7 @@ def sweep(
 
 
 def _name(function: Callable[..., object]) -> str:
-    """Name of a function, without its module: that differs where it is defined in a program or a notebook."""
+    """Returns a function's name without its module, which differs between a program and a notebook."""
     inner = getattr(function, "func", function)
     return str(getattr(inner, "__qualname__", type(inner).__qualname__))
 
@@ -226,7 +226,7 @@ def _stored(
     report: Callable[[int, int], None] | None,
     store: Results,
 ) -> Sweep[P, R]:
-    """As :func:`sweep`, with the results in a folder."""
+    """Runs a sweep like :func:`sweep` and stores the results in a folder."""
     parameters = dict(zip(seeds, given, strict=True))
     found: dict[int, R] = store.finished(parameters)
     errors: dict[int, str] = {}

@@ -136,7 +136,7 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         velocity = self._speed_m_per_s * np.clip(wanted, -1.0, 1.0)
         change = np.clip(velocity - self._velocity, -self._change_m_per_s, self._change_m_per_s)
         velocity = self._velocity + change
-        # The way at constant acceleration: so the reference's own way from one velocity to the next has no detour.
+        # Displacement at constant acceleration, so that the reference goes straight from one velocity to the next.
         target = self._reference + 0.5 * (self._velocity + velocity) / self._rate_hz
         try:
             self._points.send(target, velocity)
@@ -157,7 +157,7 @@ class ReachEnv(gymnasium.Env[Array, Array]):
         return self._observation(state), reward, state.fault is not None, self._taken >= self._steps, info
 
     def close(self) -> None:
-        """Close the connection of a running system; its arm holds."""
+        """Close the connection to a running system; its controller then holds the arm."""
         self._system.close()
 
     def _observation(self, state: State) -> Array:

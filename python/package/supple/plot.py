@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 BLUE, VERMILION, GREEN, PURPLE, ORANGE = "#0072B2", "#D55E00", "#009E73", "#B45A96", "#E69F00"
 COLOURS = (BLUE, VERMILION, GREEN, PURPLE, ORANGE)
 REFERENCE: dict[str, Any] = {"color": "#B4BBC6", "linewidth": 3.0}
-# Curves of the torque and the terms whose sum each of them is; all other terms are one more curve.
+# Each curve of the torque with the terms that it adds up; all other terms are one further curve.
 TERM_CURVES = {
     "gravity": ("gravity",),
     "friction": ("friction",),
@@ -119,7 +119,7 @@ def joints(result: Any, axes: Any = None) -> Figure:
 
 
 def torques(log: Log, axes: Any = None) -> Figure:
-    """The terms of each joint's torque, which add up to it before its limits, and what was commanded.
+    """The terms whose sum is each joint's torque before the limits, and the commanded torque.
 
     The curves are gravity, friction, inertia with Coriolis, feedback, and the sum of all other terms, such as ripple and
     what was learned.
@@ -152,7 +152,7 @@ def torques(log: Log, axes: Any = None) -> Figure:
 
 
 def sweep(results: Sweep[float, float], xlabel: str = "parameter", ylabel: str = "result", axes: Any = None) -> Figure:
-    """Results of a sweep over numbers: every one, and the median of each parameter.
+    """Every result of a sweep over numbers, and the median for each parameter.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ use worker::{RequestError, Worker};
 
 /// Timeout for the answer to an idle request.
 const IDLE_TIMEOUT: Duration = Duration::from_secs(5);
-/// Time between two looks for signals.
+/// Time between two checks for signals.
 const SIGNAL_CHECK: Duration = Duration::from_millis(100);
 
 /// A connection to the system with a prefix. A thread receives its telemetry from the beginning.
@@ -164,7 +164,7 @@ impl Connection {
         ))
     }
 
-    /// Requests idle, over a socket of its own, so that it passes every queue.
+    /// Requests idle, over a separate socket, so that the request bypasses every queue.
     fn idle(&self, py: Python<'_>) -> PyResult<(u64, &'static str)> {
         let answer = py
             .detach(|| request_idle(&self.domain, IDLE_TIMEOUT))
@@ -230,12 +230,12 @@ impl Connection {
     }
 }
 
-/// Sends a request in the thread of the connection.
+/// Returns a closure that sends a request in the thread of the connection.
 fn sender<const N: usize>(request: Request<N>, at_cycle: Option<u64>) -> worker::Send {
     Box::new(move |operator| operator.send(&request, at_cycle))
 }
 
-/// Joints, and the period: by which the time in the mode grows from one cycle to the next.
+/// Returns the number of joints, and the period: the increase of the time in the mode from one cycle to the next.
 fn first_cycles(worker: &Worker, timeout: Duration) -> Option<(usize, f64)> {
     let start = Instant::now();
     let mut received = 0;
@@ -261,7 +261,7 @@ fn first_cycles(worker: &Worker, timeout: Duration) -> Option<(usize, f64)> {
     }
 }
 
-/// A request by its names, as logs have them.
+/// Returns a request from its names, as logs have them.
 pub fn code(kind: &str, trajectory: Option<&str>, values: &[f64]) -> PyResult<RequestCode> {
     let number = |what: &str, all: &[Code], name: &str| {
         let known = all.iter().find(|code| code.name == name);
@@ -281,7 +281,7 @@ pub fn code(kind: &str, trajectory: Option<&str>, values: &[f64]) -> PyResult<Re
     RequestCode::from_parts(kind, trajectory, values).map_err(invalid)
 }
 
-/// Cycles as columns; `modes` and `faults` are lists.
+/// Returns cycles as columns; `modes` and `faults` are lists.
 pub fn columns<'py>(
     py: Python<'py>,
     dof: usize,

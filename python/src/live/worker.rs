@@ -1,6 +1,6 @@
 //! The thread that owns the ports of a connection: iceoryx2's ports stay in the thread that created them.
 //!
-//! It keeps the last telemetry for readers, sends requests as they come and passes replies on. It computes nothing.
+//! The thread keeps the last telemetry for readers, sends requests and forwards replies. It computes nothing.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, SyncSender, channel, sync_channel};
@@ -12,7 +12,7 @@ use supple_ipc::{CommandSlot, Domain, IpcError, OperatorClient, TelemetryReader}
 
 /// Number of cycles that are kept for readers.
 pub const HISTORY: usize = 8192;
-/// Time between two looks for telemetry while no request comes.
+/// Time between two checks for telemetry without a request.
 const POLL: Duration = Duration::from_millis(1);
 /// Timeout for a reply.
 const ANSWER_TIMEOUT: Duration = Duration::from_secs(5);
@@ -24,10 +24,10 @@ pub type Send =
 /// Why a request was not carried out.
 #[derive(Debug, thiserror::Error)]
 pub enum RequestError {
-    /// Shared memory, or another program commands the system.
+    /// Shared memory failed, or another program commands the system.
     #[error(transparent)]
     Ipc(#[from] IpcError),
-    /// The controller refuses it, with its reason.
+    /// The controller refused the request, with its reason.
     #[error("{0}")]
     Refused(String),
     /// The connection has ended, with the reason.
@@ -38,14 +38,14 @@ pub enum RequestError {
     NoAnswer,
 }
 
-/// What the thread shares with readers.
+/// Telemetry that the thread shares with readers.
 #[derive(Default)]
 pub struct History {
     /// The last cycles, oldest first.
     pub cycles: VecDeque<Telemetry>,
-    /// Cycles that came before those.
+    /// Number of earlier cycles that are no longer kept.
     pub dropped: u64,
-    /// Cycles that this connection did not receive.
+    /// Number of cycles that this connection did not receive.
     pub lost: u64,
     /// Why the thread ended, if it did.
     pub ended: Option<String>,
@@ -125,13 +125,13 @@ impl Worker {
         }
     }
 
-    /// Reads what has been received.
+    /// Calls `read` with the received telemetry.
     pub fn with_history<T>(&self, read: impl FnOnce(&mut History) -> T) -> T {
         read(&mut self.shared.lock())
     }
 
-    /// Waits until more than `received` cycles have come, the thread has ended, or the time is over. Returns whether
-    /// there are more.
+    /// Waits until more than `received` cycles have been received, the thread has ended, or the timeout has passed.
+    /// Returns whether there are more.
     pub fn wait(&self, received: u64, timeout: Duration) -> bool {
         let start = Instant::now();
         let mut history = self.shared.lock();
@@ -148,7 +148,7 @@ impl Worker {
         }
     }
 
-    /// Sends a request and waits for its reply: that the controller carries it out, or has queued it.
+    /// Sends a request and waits until the controller replies that it carries it out, or has queued it.
     pub fn request(&self, send: Send) -> Result<OperatorReply, RequestError> {
         let (to, answer) = sync_channel(2);
         self.command(Command::Request(send, to))?;
@@ -157,7 +157,7 @@ impl Worker {
             .unwrap_or(Err(RequestError::NoAnswer))
     }
 
-    /// Sends a set-point and waits for nothing.
+    /// Sends a set-point without waiting for its reply.
     pub fn set_point(&self, send: Send) -> Result<(), RequestError> {
         self.command(Command::SetPoint(send))
     }
@@ -188,7 +188,7 @@ struct Commander {
 }
 
 impl Commander {
-    /// The first command takes the right to command.
+    /// Returns the commander; the first call acquires the right to command.
     fn of<'a>(
         open: &'a mut Option<Commander>,
         domain: &Domain,
@@ -210,7 +210,7 @@ impl Commander {
         send(&mut self.operator)?.ok_or(RequestError::NoAnswer)
     }
 
-    /// Passes replies to those who wait; others are of set-points.
+    /// Passes replies to waiting requests; the other replies are those of set-points.
     fn replies(&mut self, shared: &Shared) -> Result<(), IpcError> {
         while let Some(reply) = self.operator.receive()? {
             let refused = reply.outcome() == Outcome::Refused;
@@ -224,7 +224,7 @@ impl Commander {
                     true => Err(RequestError::Refused(reply.text.to_string())),
                     false => Ok(reply),
                 };
-                // Who waited may have given up.
+                // The waiting caller may have given up.
                 let _ = to.send(answer);
             } else if refused {
                 shared.lock().refused_set_point = Some(reply.text.to_string());

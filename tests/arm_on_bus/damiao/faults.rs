@@ -1,15 +1,16 @@
-//! Every error code, and every loss: a named fault within two cycles, then held, laid down, disabled.
+//! Tests of every error code and every loss: the plant loop reports the fault within two cycles, holds the arm, lays it down
+//! and disables the motors.
 
 use super::rig::{MS, Rig};
-use supple_bus::{FaultKind, FaultRule, Traffic};
+use supple_bus::{FaultKind, FaultRule, TrafficDirection};
 use supple_core::controller::Request;
 use supple_damiao::Status;
 use supple_drive::{LossReason, MotorFault, Stage};
 
-/// Time of the misbehaviours after the motors were enabled \[s\], and of the check \[s\].
+/// Time of the misbehaviours after the enabling of the motors.
 const AT: &str = "at-s=0.4";
 
-/// Runs until normal operation ends; returns the reason and the cycles since the fault began.
+/// Runs until normal operation ends; returns the reason.
 fn until_lost(rig: &mut Rig<7>) -> LossReason {
     for _ in 0..1000 {
         rig.step();
@@ -20,7 +21,7 @@ fn until_lost(rig: &mut Rig<7>) -> LossReason {
     rig.plant.guard().last_loss().expect("a loss").0
 }
 
-/// Cycles between the beginning of the misbehaviour and the end of normal operation.
+/// Returns the number of cycles between the start of the misbehaviour and the end of normal operation.
 fn delay_cycles(rig: &Rig<7>) -> u64 {
     let began = rig.arm().events().iter().find_map(|(ns, event)| {
         matches!(event, supple_emu::damiao::MotorEvent::Misbehaves(_)).then_some(*ns)
@@ -30,7 +31,7 @@ fn delay_cycles(rig: &Rig<7>) -> u64 {
 }
 
 #[test]
-fn every_error_code_is_a_named_fault_within_two_cycles() {
+fn every_error_code_is_reported_as_its_fault_within_two_cycles() {
     for (code, fault) in [
         ("8", MotorFault::OverVoltage),
         ("9", MotorFault::UnderVoltage),
@@ -41,7 +42,7 @@ fn every_error_code_is_a_named_fault_within_two_cycles() {
         ("E", MotorFault::Overload),
         ("5", MotorFault::Unknown(5)),
     ] {
-        // The wrist's last motor: the arm does not depend on it.
+        // The fault is at the last motor of the wrist, which does not carry the arm.
         let spec = format!("error:motor=7,code={code},{AT}");
         let mut rig = Rig::<7>::new("openarm", &[&spec]);
         rig.without_motor = Some(6);
@@ -68,7 +69,7 @@ fn every_error_code_is_a_named_fault_within_two_cycles() {
             rig.max_speed_rad_per_s,
             rig.fastest
         );
-        // Never enabled again without the operator: the error stays.
+        // The motor is not enabled again without the operator: the error stays.
         rig.request(Request::Reset);
         rig.run(10);
         rig.request(Request::GravityHold);
@@ -83,9 +84,9 @@ fn every_error_code_is_a_named_fault_within_two_cycles() {
 }
 
 #[test]
-fn a_silent_motor_one_that_came_back_and_a_hot_one_are_named() {
+fn silent_restarted_and_hot_motors_are_reported() {
     for (spec, expected) in [
-        (format!("silent:motor=7,{AT}"), LossReason::Encoder(6)),
+        (format!("silent:motor=7,{AT}"), LossReason::EncoderLost(6)),
         (
             format!("reappears:motor=7,{AT}"),
             LossReason::Motor(6, MotorFault::Disabled),
@@ -115,17 +116,20 @@ fn a_silent_motor_one_that_came_back_and_a_hot_one_are_named() {
     }
 }
 
-/// The controller is lost in motion: the plant loop ends that, lays the arm down and disables the motors.
+/// The controller is lost during a motion: the plant loop stops the arm, lays it down and disables the motors.
 #[test]
 fn a_controller_lost_in_motion_ends_with_the_arm_at_rest() {
     for track in [false, true] {
         let mut rig = Rig::<7>::new("openarm", &[]);
         rig.activate();
         rig.begin(track);
-        rig.forget();
+        rig.discard_measurements();
         rig.plant.link_mut().dead = true;
         rig.run_s(16.0);
-        assert_eq!(rig.plant.guard().last_loss().unwrap().0, LossReason::Answer);
+        assert_eq!(
+            rig.plant.guard().last_loss().unwrap().0,
+            LossReason::NoAnswer
+        );
         assert!(rig.all(Status::Disabled), "tracking: {track}");
         // The limit of the arm's joints is 2 rad/s.
         let speed = rig.max_speed_rad_per_s;
@@ -133,7 +137,7 @@ fn a_controller_lost_in_motion_ends_with_the_arm_at_rest() {
     }
 }
 
-/// The controller is lost: the plant loop holds the arm itself, lays it down and disables the motors.
+/// The controller is lost: the plant loop holds the arm, lays it down and disables the motors.
 #[test]
 fn a_lost_controller_ends_with_the_arm_at_rest() {
     let mut rig = Rig::<7>::new("openarm", &[]);
@@ -143,12 +147,15 @@ fn a_lost_controller_ends_with_the_arm_at_rest() {
     rig.run_s(0.4);
     assert!(tip_m - rig.min_tip_m < 0.03, "{}", tip_m - rig.min_tip_m);
     rig.run_s(15.0);
-    assert_eq!(rig.plant.guard().last_loss().unwrap().0, LossReason::Answer);
+    assert_eq!(
+        rig.plant.guard().last_loss().unwrap().0,
+        LossReason::NoAnswer
+    );
     assert!(rig.all(Status::Disabled));
     assert!(rig.max_speed_rad_per_s < 0.5, "{}", rig.max_speed_rad_per_s);
 }
 
-/// The host itself is lost: within 20 ms and one period no motor has torque.
+/// The host is lost: within 20 ms and one period, no motor has torque.
 #[test]
 fn a_lost_host_ends_the_torque_within_the_watchdog() {
     use supple_bus::Bus;
@@ -161,11 +168,11 @@ fn a_lost_host_ends_the_torque_within_the_watchdog() {
     assert_eq!(rig.arm().motor_torque_nm().amax(), 0.0);
 }
 
-/// A wedged adapter and bus-off: named, and the motors end their torque by themselves.
+/// A wedged adapter and a bus-off are reported, and the watchdogs of the motors end the torque.
 #[test]
-fn a_dead_bus_is_named_and_the_motors_end_their_torque() {
+fn a_dead_bus_is_reported_and_the_watchdogs_end_the_torque() {
     for (spec, expected) in [
-        (format!("wedged:{AT}"), LossReason::Transmit),
+        (format!("wedged:{AT}"), LossReason::NotTransmitted),
         (format!("bus-off:{AT}"), LossReason::BusOff),
     ] {
         let mut rig = Rig::<7>::new("openarm", &[&spec]);
@@ -176,12 +183,12 @@ fn a_dead_bus_is_named_and_the_motors_end_their_torque() {
     }
 }
 
-/// Lost replies here and there are bridged; a state is never used twice.
+/// Occasional lost replies are tolerated; a state is never used twice.
 #[test]
-fn single_lost_replies_are_bridged() {
+fn single_lost_replies_are_tolerated() {
     let mut rig = Rig::<7>::new("openarm", &[]);
     rig.activate();
-    let rule = FaultRule::always(Traffic::Received, FaultKind::Loss)
+    let rule = FaultRule::always(TrafficDirection::Received, FaultKind::Loss)
         .only(|id| id.raw() == 0x13)
         .with_probability(0.02);
     rig.plant.drive_mut().bus_mut().add(rule);
@@ -195,8 +202,8 @@ fn single_lost_replies_are_bridged() {
     assert_eq!(rig.plant.counters().replies_lost, missing as u64);
 }
 
-/// Every row of the table while the arm moves and while it tracks: the same names in the same time, no joint faster than
-/// it was allowed to be, and disabled motors at the end.
+/// Runs every row of the fault table while the arm moves and while it tracks: the same faults are reported in the same time, no
+/// joint exceeds its allowed speed, and the motors are disabled at the end.
 #[test]
 fn the_fault_table_holds_while_moving_and_tracking() {
     let motor = |fault| LossReason::Motor(6, fault);
@@ -208,23 +215,23 @@ fn the_fault_table_holds_while_moving_and_tracking() {
         ("error:motor=7,code=C", motor(MotorFault::HotWinding)),
         ("error:motor=7,code=D", motor(MotorFault::CommunicationLost)),
         ("error:motor=7,code=E", motor(MotorFault::Overload)),
-        ("silent:motor=7", LossReason::Encoder(6)),
+        ("silent:motor=7", LossReason::EncoderLost(6)),
         ("reappears:motor=7", motor(MotorFault::Disabled)),
         ("hot:motor=7,celsius=110", motor(MotorFault::Hot)),
-        ("wedged", LossReason::Transmit),
+        ("wedged", LossReason::NotTransmitted),
         ("bus-off", LossReason::BusOff),
     ];
     for track in [false, true] {
         for (kind, expected) in rows {
             let separator = if kind.contains(':') { ',' } else { ':' };
-            // In the middle of each motion.
+            // The fault is in the middle of each motion.
             let at_s = if track { 3 } else { 1 };
             let spec = format!("{kind}{separator}at-s={at_s}");
             let mut rig = Rig::<7>::new("openarm", &[&spec]);
             rig.without_motor = Some(6);
             rig.activate();
             rig.begin(track);
-            rig.forget();
+            rig.discard_measurements();
             for _ in 0..2000 {
                 if rig.plant.guard().stage() != Stage::Active {
                     break;
@@ -233,14 +240,14 @@ fn the_fault_table_holds_while_moving_and_tracking() {
             }
             let (reason, _) = rig.plant.guard().last_loss().expect("a loss");
             assert_eq!(reason, expected, "{spec}, tracking: {track}");
-            let within = if expected == LossReason::Transmit {
+            let within = if expected == LossReason::NotTransmitted {
                 12
             } else {
                 2
             };
             let delay = delay_cycles(&rig);
             assert!(delay <= within, "{spec}, tracking: {track}: {delay} cycles");
-            let powered = !matches!(expected, LossReason::Transmit | LossReason::BusOff);
+            let powered = !matches!(expected, LossReason::NotTransmitted | LossReason::BusOff);
             rig.run_s(if powered { 12.0 } else { 0.03 });
             let enabled = rig.arm().motors()[..6]
                 .iter()

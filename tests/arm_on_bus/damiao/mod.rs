@@ -1,4 +1,4 @@
-//! Arms of Damiao motors: the driver of `supple-can` (its `Drive`) against emulated motors, in virtual time.
+//! Tests of the drive of Damiao motors in `supple-can` with emulated motors, in virtual time.
 
 mod faults;
 mod normal_operation;

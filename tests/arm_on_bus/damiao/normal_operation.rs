@@ -1,13 +1,14 @@
-//! Normal operation: enabling, holding, laying down, rates.
+//! Tests of normal operation: enabling, holding, laying down, rates.
 
 use super::rig::Rig;
-use supple_bus::{FaultKind, FaultRule, Traffic};
+use supple_bus::{FaultKind, FaultRule, TrafficDirection};
 use supple_core::controller::Request;
 use supple_damiao::Status;
 use supple_drive::{Drives, LossReason, Stage};
 use supple_model::Description;
 
-/// Enabled with gravity torque from the first command on: the tip sags less than 2 mm, no joint moves 0.01 rad.
+/// The motors are enabled with gravity torque from the first command on: the tip sags less than 2 mm, and no joint moves 0.01
+/// rad.
 #[test]
 fn enabling_in_gravity_hold_moves_nothing() {
     fn check<const N: usize>(name: &str) {
@@ -31,7 +32,7 @@ fn enabling_in_gravity_hold_moves_nothing() {
     check::<6>("yam");
 }
 
-/// The motors stay disabled in every mode but gravity hold, and without a controller that wants torque.
+/// The motors stay disabled in every mode except gravity hold, and without a controller that requests torque.
 #[test]
 fn motors_are_enabled_in_gravity_hold_only() {
     let mut rig = Rig::<7>::new("openarm", &[]);
@@ -41,10 +42,10 @@ fn motors_are_enabled_in_gravity_hold_only() {
     rig.activate();
 }
 
-/// A controller that withdraws its torque while the motors are being enabled gets them disabled, not an arm that is laid
-/// down. One motor's replies are lost, so that enabling lasts.
+/// If the controller ends its torque request while the motors are being enabled, the motors are disabled and the arm is not laid
+/// down. The replies of one motor are lost, so that enabling takes longer.
 #[test]
-fn torque_withdrawn_while_the_motors_are_enabled_disables_them() {
+fn ending_the_torque_request_while_motors_are_being_enabled_disables_them() {
     let cycles_until_enabled = |rig: &mut Rig<7>| {
         rig.run(5);
         rig.request(Request::GravityHold);
@@ -60,7 +61,8 @@ fn torque_withdrawn_while_the_motors_are_enabled_disables_them() {
     rig.run(5);
     rig.request(Request::GravityHold);
     rig.run(cycles - 1);
-    let rule = FaultRule::always(Traffic::Received, FaultKind::Loss).only(|id| id.raw() == 0x17);
+    let rule =
+        FaultRule::always(TrafficDirection::Received, FaultKind::Loss).only(|id| id.raw() == 0x17);
     rig.plant.drive_mut().bus_mut().add(rule);
     rig.step();
     assert!(rig.all(Status::Enabled));
@@ -74,7 +76,7 @@ fn torque_withdrawn_while_the_motors_are_enabled_disables_them() {
     assert!(!stages.contains(&"stowing"), "{stages:?}");
 }
 
-/// Idle is asked for: held, laid down, disabled, each with its reason, never faster than 0.5 rad/s.
+/// After an idle request, the arm is held, laid down and disabled, each with its reason, and no joint exceeds 0.5 rad/s.
 #[test]
 fn idle_lays_the_arm_down_before_the_motors_are_disabled() {
     fn check<const N: usize>(name: &str) {
@@ -109,14 +111,14 @@ fn idle_lays_the_arm_down_before_the_motors_are_disabled() {
         let off = rig.arm().truth().position_rad.iter().zip(&stow);
         let off = off.map(|(q, stow)| (q - stow).abs()).fold(0.0, f64::max);
         assert!(off < 0.1, "{name}: {off} rad from the rest pose");
-        // Nothing is latched: the operator may go on.
+        // No loss is latched: the operator may continue.
         rig.activate();
     }
     check::<7>("openarm");
     check::<6>("yam");
 }
 
-/// A shutdown in the middle ends there too.
+/// A shutdown during operation also lays the arm down.
 #[test]
 fn a_shutdown_lays_the_arm_down() {
     let mut rig = Rig::<7>::new("openarm", &[]);
@@ -126,13 +128,13 @@ fn a_shutdown_lays_the_arm_down() {
     assert!(rig.all(Status::Disabled));
     assert_eq!(
         rig.plant.guard().last_loss().unwrap().0,
-        LossReason::Leaving
+        LossReason::ShuttingDown
     );
     assert_eq!(rig.plant.guard().stage(), Stage::Resting);
     assert!(rig.max_speed_rad_per_s < 0.5, "{}", rig.max_speed_rad_per_s);
 }
 
-/// The arm with its motors set to classic frames.
+/// Returns the OpenArm with motors that use classic frames.
 fn classic_openarm() -> Description {
     let from = std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/openarm"));
     let folder = tempfile::tempdir().unwrap();
@@ -144,7 +146,7 @@ fn classic_openarm() -> Description {
     Description::find_at_rate(path.to_str().unwrap(), None).unwrap()
 }
 
-/// The period is a value: gravity hold at each rate, on the bus that carries it.
+/// Gravity hold works at each rate that the bus allows.
 #[test]
 fn every_rate_that_the_bus_carries_holds_the_arm() {
     for (rate_hz, classic) in [

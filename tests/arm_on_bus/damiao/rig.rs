@@ -25,16 +25,15 @@ pub struct Rig<const N: usize> {
     pub period_ns: u64,
     /// Stages in order, each once.
     pub stages: Vec<Stage>,
-    /// Joint without a motor, whose speed is not watched.
+    /// Joint without a motor, whose speed is not checked.
     pub without_motor: Option<usize>,
-    /// Greatest joint speed \[rad/s\] with its joint and the stage in which it occurred, and the lowest height of the
-    /// tip \[m\].
+    /// Maximum joint speed \[rad/s\]; the fields below have its joint, its stage, and the minimum height of the tip \[m\].
     pub max_speed_rad_per_s: f64,
     pub fastest: Option<(usize, Stage)>,
     pub min_tip_m: f64,
 }
 
-/// Emulated motors of an arm at rest.
+/// Creates emulated motors of an arm at standstill.
 pub fn arm<const N: usize>(
     description: &Description,
     change: impl FnOnce(&mut DamiaoConfig),
@@ -57,7 +56,7 @@ pub fn arm<const N: usize>(
 }
 
 impl<const N: usize> Rig<N> {
-    /// An arm after start-up, with disabled motors.
+    /// Creates an arm after start-up, with disabled motors.
     pub fn try_new(
         description: Description,
         change: impl FnOnce(&mut DamiaoConfig),
@@ -92,7 +91,7 @@ impl<const N: usize> Rig<N> {
         Rig::try_new(description, |_| (), None, misbehaviours).unwrap()
     }
 
-    /// The same, from a pose.
+    /// Creates an arm after start-up in this pose, with disabled motors.
     pub fn new_at(name: &str, start_rad: Vector<N>, misbehaviours: &[&str]) -> Rig<N> {
         let description = Description::asset(name).unwrap();
         Rig::try_new(description, |_| (), Some(start_rad), misbehaviours).unwrap()
@@ -141,7 +140,7 @@ impl<const N: usize> Rig<N> {
         self.run((duration_s * 1e9 / self.period_ns as f64).round() as usize);
     }
 
-    /// Gravity hold with enabled motors; what was measured before is forgotten.
+    /// Enters gravity hold with enabled motors, and discards earlier measurements.
     pub fn activate(&mut self) {
         self.run(5);
         self.request(Request::GravityHold);
@@ -149,10 +148,10 @@ impl<const N: usize> Rig<N> {
         assert_eq!(self.plant.drives(), Drives::Active);
         assert_eq!(self.plant.guard().stage(), Stage::Active);
         assert!(self.all(Status::Enabled));
-        self.forget();
+        self.discard_measurements();
     }
 
-    /// Gravity hold until the motors are enabled, and no longer.
+    /// Requests gravity hold until the motors are enabled.
     pub fn enable(&mut self) {
         self.run(5);
         self.request(Request::GravityHold);
@@ -163,10 +162,10 @@ impl<const N: usize> Rig<N> {
             self.step();
         }
         assert!(self.all(Status::Enabled));
-        self.forget();
+        self.discard_measurements();
     }
 
-    /// A slow move of the elbow is under way for half a second, or with `track` a small sinusoid about the pose.
+    /// Starts a slow move of the elbow, or with `track` a small sinusoid about the pose, and runs it for half a second.
     pub fn begin(&mut self, track: bool) {
         let config = self.description.config::<N>().unwrap();
         let home_rad = self.description.home::<N>().unwrap();
@@ -193,7 +192,7 @@ impl<const N: usize> Rig<N> {
         assert!(speed > 0.02, "nothing moves: {speed} rad/s");
     }
 
-    pub fn forget(&mut self) {
+    pub fn discard_measurements(&mut self) {
         self.max_speed_rad_per_s = 0.0;
         self.min_tip_m = f64::INFINITY;
         self.fastest = None;
@@ -206,7 +205,7 @@ impl<const N: usize> Rig<N> {
             .all(|motor| motor.status() == status)
     }
 
-    /// Names of the stages so far.
+    /// Returns the names of the stages so far.
     pub fn stage_names(&self) -> Vec<&'static str> {
         let name = |stage: &Stage| match stage {
             Stage::Resting => "resting",

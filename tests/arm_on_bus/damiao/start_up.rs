@@ -1,4 +1,5 @@
-//! Start-up refuses what does not fit, names motor, register, found, expected and remedy, and enables nothing.
+//! Tests that start-up refuses motors that do not match, with motor, register, found value, expected value and remedy, and
+//! enables no motor.
 
 use super::rig::Rig;
 use supple_core::Vector;
@@ -16,9 +17,9 @@ fn refusal(misbehaviour: &str) -> String {
 }
 
 #[test]
-fn motors_that_do_not_fit_are_refused_with_register_found_expected_and_remedy() {
+fn motors_that_do_not_match_are_refused_with_register_found_and_expected_value_and_remedy() {
     for (misbehaviour, parts) in [
-        // VMAX 8 where the file expects 10.
+        // VMAX is 8, but the TOML expects 10.
         (
             "register:motor=3,number=22,value=8",
             &["joint3", "register 22 (VMAX)", "8", "10", "never write"][..],
@@ -54,14 +55,14 @@ fn motors_that_do_not_fit_are_refused_with_register_found_expected_and_remedy() 
     }
 }
 
-/// A motor whose first write has no effect is refused; not silently driven without a watchdog.
+/// A motor whose first write has no effect is refused instead of being used without a watchdog.
 #[test]
-fn a_write_that_has_no_effect_is_noticed() {
+fn a_write_that_has_no_effect_is_refused() {
     let error = refusal("first-write-ignored:motor=1");
     assert!(error.contains("after"), "{error}");
 }
 
-/// After a loss of its host a motor reports it; the operator starts the program again, and it is accepted.
+/// After the loss of its host, a motor reports lost communication; a restarted program accepts the motor.
 #[test]
 fn a_motor_that_lost_its_last_host_is_accepted() {
     let description = Description::asset("openarm").unwrap();
@@ -70,7 +71,7 @@ fn a_motor_that_lost_its_last_host_is_accepted() {
     assert_eq!(rig.plant.drives(), Drives::Idle);
 }
 
-/// Positions that start a whole turn off are unwrapped; a zero outside the limits is refused with joint and angle.
+/// Start positions with an error of a whole turn are unwrapped; a wrong zero position is refused with joint and angle.
 #[test]
 fn whole_turns_are_unwrapped_and_other_offsets_refused() {
     let home: Vector<7> = Description::asset("openarm").unwrap().home().unwrap();

@@ -1,5 +1,5 @@
-//! A motor whose zero moved while the program was not running, so that no jump shows, and a controller that is lost: the
-//! torque with which the loop holds the arm is computed from a wrong angle, and drives it.
+//! Tests with a motor whose zero position moved while the program was not running, so that no jump is detected, and with a lost
+//! controller: the plant loop computes the holding torque from a wrong angle, and this torque accelerates the arm.
 
 use super::rig::Rig;
 use supple_core::Vector;
@@ -8,17 +8,17 @@ use supple_drive::{Drives, LossReason, Stage};
 
 /// Speed limit of every joint of this arm \[rad/s\].
 const LIMIT_RAD_PER_S: f64 = 2.0;
-/// Longest time above it while the arm is held \[s\]: 10 ms to be sure, as much again for estimate and torque.
+/// Maximum time above the speed limit while the arm is held \[s\]: 10 ms until detection, the rest for estimation and torque.
 const FAST_S: f64 = 0.025;
-/// Work that rounding and the age of a torque leave to damping motors in a cycle \[J\].
+/// Tolerance of the work of damping motors in a cycle, for rounding and the age of a torque \[J\].
 const ROUNDING_J: f64 = 1e-4;
 
-/// What one run did, from the loss on.
+/// Result of a run, from the loss on.
 struct Run {
     stages: Vec<&'static str>,
-    /// Longest time for which a joint was above its limit while the loop held the arm or laid it down \[s\].
+    /// Maximum time for which a joint was above its limit while the loop held the arm or laid it down \[s\].
     fast_s: f64,
-    /// Work that the motors did in a cycle while they damped, at most \[J\].
+    /// Maximum work of the motors in a cycle while they damped \[J\].
     damping_work_j: f64,
     reason: Option<LossReason>,
     ended: bool,
@@ -48,7 +48,7 @@ fn run(motor: usize, offset_rad: f64) -> Run {
             damped_cycles += 1;
             let report = rig.plant.link_mut().report.expect("a report");
             assert!(damped_cycles == 1 || report.drives == Drives::Held);
-            // The torque of holding fades in 5 ms, and acts two cycles later.
+            // The holding torque fades in 5 ms and acts two cycles later.
             if damped_cycles > 8 {
                 let work_j = rig.arm().motor_torque_nm().dot(&velocity) * 1e-3;
                 damping_work_j = damping_work_j.max(work_j);
@@ -67,10 +67,10 @@ fn run(motor: usize, offset_rad: f64) -> Run {
     }
 }
 
-/// Expected: the shoulder, which holding drives beyond its limit, ends the torque within 25 ms of exceeding it; from then
-/// on the motors take energy from the arm, and they are disabled at its rest.
+/// Expected: the holding torque accelerates the shoulder beyond its speed limit, and ends within 25 ms after that. From then on,
+/// the motors take energy from the arm; they are disabled at standstill.
 #[test]
-fn a_hold_that_drives_the_arm_ends_in_damping() {
+fn overspeed_while_the_arm_is_held_leads_to_damping() {
     let run = run(1, -1.0);
     assert_eq!(
         run.stages,
@@ -78,13 +78,13 @@ fn a_hold_that_drives_the_arm_ends_in_damping() {
             "resting", "active", "holding", "damping", "lowering", "resting"
         ]
     );
-    assert_eq!(run.reason, Some(LossReason::HoldDrives(0)));
+    assert_eq!(run.reason, Some(LossReason::OverspeedInHold(0)));
     assert!(run.fast_s < FAST_S, "{} s", run.fast_s);
     assert!(run.damping_work_j < ROUNDING_J, "{} J", run.damping_work_j);
     assert!(run.ended);
 }
 
-/// Expected of other joints and of the other direction: no joint stays above its limit, whether the torque ends or not.
+/// Expected for other joints and the other direction: no joint stays above its limit, whether the torque ends or not.
 #[test]
 fn no_wrong_zero_keeps_a_joint_above_its_limit() {
     for (motor, offset_rad) in [(1, 1.0), (2, 1.0), (4, 1.0), (4, -1.0)] {

@@ -1,4 +1,4 @@
-//! Arm descriptions: a fuzzed URDF with a valid TOML, and a fuzzed TOML with a valid URDF.
+//! Fuzz targets of arm descriptions: a fuzzed URDF with a valid TOML, and a fuzzed TOML with a valid URDF.
 
 use supple_core::Controller;
 use supple_model::Description;
@@ -8,21 +8,21 @@ pub const TOML: &str = include_str!("../../../assets/wam3/arm.toml");
 /// URDF of the built-in arm with three joints.
 pub const URDF: &str = include_str!("../../../assets/wam3/arm.urdf");
 
-/// Bytes as a URDF.
+/// Reads the bytes as a URDF.
 pub fn urdf(data: &[u8]) {
     if let Ok(text) = core::str::from_utf8(data) {
         describe(TOML, text);
     }
 }
 
-/// Bytes as a TOML.
+/// Reads the bytes as a TOML.
 pub fn toml(data: &[u8]) {
     if let Ok(text) = core::str::from_utf8(data) {
         describe(text, URDF);
     }
 }
 
-/// An accepted description can be controlled, or the controller rejects it; every rejection has a reason.
+/// Reads a description. The controller accepts or rejects a valid one; every rejection has a reason.
 fn describe(toml: &str, urdf: &str) {
     match Description::from_text(toml, urdf) {
         Err(error) => assert!(!error.to_string().is_empty()),
@@ -33,7 +33,7 @@ fn describe(toml: &str, urdf: &str) {
             }
             let _ = description.home::<3>();
             assert_eq!(description.joint_names().len(), description.dof());
-            // The text is kept, but for declarations of prefixes that it lacks.
+            // The text is unchanged, except for declarations of missing prefixes.
             let kept = description.urdf();
             if kept != urdf {
                 assert!(kept.contains(" xmlns:"));

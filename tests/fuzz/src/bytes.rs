@@ -24,7 +24,7 @@ unsafe impl AnyBitPattern for OperatorReply {}
 // SAFETY: as above.
 unsafe impl AnyBitPattern for Telemetry {}
 
-/// The value with these bytes; missing bytes are zero, additional bytes are ignored.
+/// Returns the value with these bytes; missing bytes are zero, additional bytes are ignored.
 pub fn value_of<T: AnyBitPattern>(bytes: &[u8]) -> T {
     let mut value = MaybeUninit::<T>::zeroed();
     let length = bytes.len().min(size_of::<T>());
@@ -35,14 +35,14 @@ pub fn value_of<T: AnyBitPattern>(bytes: &[u8]) -> T {
     }
 }
 
-/// The bytes of a value.
+/// Returns the bytes of a value.
 pub fn bytes_of<T: AnyBitPattern>(value: &T) -> Vec<u8> {
     let start: *const u8 = core::ptr::from_ref(value).cast();
     // SAFETY: a `T` has no padding, so all of its bytes were written.
     unsafe { core::slice::from_raw_parts(start, size_of::<T>()) }.to_vec()
 }
 
-/// All values in the bytes, the last one padded with zeros.
+/// Returns all values in the bytes; the last value is padded with zeros.
 pub fn values_of<T: AnyBitPattern>(bytes: &[u8]) -> impl Iterator<Item = T> {
     bytes.chunks(size_of::<T>()).map(value_of)
 }

@@ -1,9 +1,9 @@
-//! Frames of Damiao motors, as the host and as a motor read them.
+//! Fuzz targets of Damiao frames, as the host and as a motor parse them.
 
 use supple_damiao::register::Operation;
 use supple_damiao::{Feedback, Frame, MitCodes, Register, RegisterReply, Request};
 
-/// Two bytes of id, then the payload.
+/// Builds a frame from two bytes of id and the payload.
 fn frame(data: &[u8]) -> Option<Frame> {
     let (id, payload) = data.split_first_chunk()?;
     let id = u32::from(u16::from_le_bytes(*id));
@@ -12,7 +12,7 @@ fn frame(data: &[u8]) -> Option<Frame> {
     frame.ok()
 }
 
-/// Any frame that reaches the host, taken as feedback and as a register reply.
+/// Parses any frame to the host as feedback and as a register reply.
 pub fn damiao_reply(data: &[u8]) {
     let Some(frame) = frame(data) else {
         return;
@@ -33,7 +33,7 @@ pub fn damiao_reply(data: &[u8]) {
     }
 }
 
-/// Any frame that reaches a motor.
+/// Parses any frame to a motor.
 pub fn damiao_request(data: &[u8]) {
     let Some(frame) = frame(data) else {
         return;
@@ -43,7 +43,7 @@ pub fn damiao_request(data: &[u8]) {
     assert!(requests.len() <= 1, "one motor receives a frame");
     for (id, request) in requests {
         if let Request::Mit(codes) = request {
-            // What the host sends from the same numbers is a command too, never a special frame.
+            // Encoding the parsed codes gives a command, never a special frame.
             let again = codes.emit(id);
             assert!(matches!(Request::parse(&again, id), Some(Request::Mit(_))));
             let kp = codes.kp.min(0xFFE);

@@ -1,4 +1,4 @@
-//! Inputs of an emulated arm: lines at its pendant's socket, and frames on its bus.
+//! Fuzz targets of an emulated arm: lines for the socket of its pendant, and frames on its bus.
 
 use std::sync::OnceLock;
 use supple_bus::virtual_time::EmulatedNodes;
@@ -23,14 +23,14 @@ fn emulator() -> Emulator<4> {
         (plant, description.home().expect("four joints"))
     });
     let config = EmulatorConfig {
-        // Its encoders have their zero: it starts in idle.
+        // The arm has its position reference and starts in idle.
         zeroed: true,
         ..EmulatorConfig::wam(4)
     };
     Emulator::new(config, plant.clone(), *home_rad, 0).expect("a valid arm")
 }
 
-/// Lines at the pendant's socket, each followed by an interval of time.
+/// Sends lines to the pendant, each followed by an interval of time.
 pub fn pendant_line(data: &[u8]) {
     let Ok(text) = core::str::from_utf8(data) else {
         return;
@@ -44,7 +44,7 @@ pub fn pendant_line(data: &[u8]) {
     }
 }
 
-/// Raw frames of a host, 16 bytes each: data frames are sent, error frames only pass the codec both ways.
+/// Reads raw frames of a host, 16 bytes each: sends data frames, and only decodes and encodes error frames.
 pub fn arm_bus(data: &[u8]) {
     let mut emulator = emulator();
     for raw in data.chunks_exact(CAN_FRAME_BYTES).take(FRAMES) {

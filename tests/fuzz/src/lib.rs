@@ -1,4 +1,4 @@
-//! Fuzz targets: everything that parses external bytes, as functions of a byte slice.
+//! Fuzz targets: all parsers of external bytes, as functions of a byte slice.
 //!
 //! A [`Target`] must accept any bytes: it returns in bounded time and memory, and its assertions hold. cargo-fuzz
 //! runs the targets with coverage (`libfuzzer/`, one program each); a test on the stable compiler runs them over the

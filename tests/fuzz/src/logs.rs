@@ -1,4 +1,4 @@
-//! Logs: a file with any content is read, exported, recovered and replayed, or rejected.
+//! Fuzz targets of logs: a file with any content is read, exported, recovered and replayed, or rejected.
 
 use crate::bytes::with_file;
 use core::num::NonZeroU64;
@@ -10,7 +10,7 @@ use supple_core::{Controller, State, step};
 use supple_log::{Extras, LogError, Reader, RunInfo, Writer, export_csv, info, recover, replay};
 use supple_model::Description;
 
-/// The bytes as a log file.
+/// Reads the bytes as a log file.
 pub fn log(data: &[u8]) {
     with_file("input.mcap", data, |path| {
         let _ = info(path).map(|info| format!("{info:?}"));
@@ -47,7 +47,7 @@ fn read(path: &Path) {
 /// Opcode and length before every record of a file.
 const RECORD_PREFIX_BYTES: usize = 9;
 
-/// A message definition, a zero byte and a message, in an otherwise valid log.
+/// Reads the bytes as a message definition, a zero byte and a message, in an otherwise valid log.
 pub fn log_schema(data: &[u8]) {
     if let Ok(table) = exported(data) {
         let lines = table.split(|byte| *byte == b'\n').count();
@@ -56,10 +56,10 @@ pub fn log_schema(data: &[u8]) {
     }
 }
 
-/// Table of a log with this definition and message.
+/// Exports a log with this definition and message as a table.
 ///
 /// # Errors
-/// Why the log cannot be exported.
+/// The reason why the log cannot be exported.
 pub fn exported(data: &[u8]) -> Result<Vec<u8>, LogError> {
     let end = data.iter().position(|byte| *byte == 0);
     let end = end.unwrap_or(data.len());
@@ -71,7 +71,7 @@ pub fn exported(data: &[u8]) -> Result<Vec<u8>, LogError> {
     })
 }
 
-/// A log with one channel and one message, without compression and checksums.
+/// Creates a log with one channel and one message, without compression and checksums.
 fn file_with(schema: &[u8], message: &[u8]) -> Vec<u8> {
     let written = || -> Result<Vec<u8>, mcap::McapError> {
         let options = mcap::WriteOptions::new()
@@ -94,7 +94,7 @@ fn file_with(schema: &[u8], message: &[u8]) -> Vec<u8> {
         writer.finish()?;
         Ok(writer.into_inner().into_inner())
     };
-    let file = written().expect("nothing that depends on the input");
+    let file = written().expect("writing does not depend on the input");
     assert!(file.len() > RECORD_PREFIX_BYTES);
     file
 }
@@ -112,7 +112,7 @@ fn about() -> BTreeMap<String, String> {
     BTreeMap::from(entries)
 }
 
-/// A log of the built-in arm with three joints: complete, truncated, and without compression.
+/// Returns a log of the built-in arm with three joints: complete, truncated, and without compression.
 pub fn seeds() -> Vec<crate::seed::Seed> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("seed.mcap");
@@ -127,7 +127,7 @@ pub fn seeds() -> Vec<crate::seed::Seed> {
     ]
 }
 
-/// Some steps of an arm at rest, with a request and a fault.
+/// Writes a log of some steps of an arm at rest, with a request and a fault.
 fn write(path: &Path) {
     let description = Description::asset("wam3").expect("built in");
     let config = description.config::<3>().expect("three joints");
@@ -150,7 +150,7 @@ fn write(path: &Path) {
     writer.finish().expect("complete");
 }
 
-/// The same metadata, attachments, channels and messages without compression and checksums.
+/// Rewrites a log with the same metadata, attachments, channels and messages, without compression and checksums.
 fn uncompressed(file: &[u8]) -> Vec<u8> {
     let rewritten = || -> Result<Vec<u8>, mcap::McapError> {
         let options = mcap::WriteOptions::new()
@@ -180,5 +180,5 @@ fn uncompressed(file: &[u8]) -> Vec<u8> {
         writer.finish()?;
         Ok(writer.into_inner().into_inner())
     };
-    rewritten().expect("a log of our own")
+    rewritten().expect("the log is valid")
 }

@@ -1,5 +1,4 @@
-//! Messages between the processes with arbitrary content, as a faulty process may write them to shared memory, and the
-//! code that reads them.
+//! Fuzz targets of messages between the processes with arbitrary content, as a faulty process may write them to shared memory.
 
 use crate::bytes::{value_of, values_of};
 use crate::requests::{assert_valid_output, controller};
@@ -36,7 +35,7 @@ pub fn arm_state(data: &[u8]) {
     }
 }
 
-/// Torque commands, as the process that owns the motors reads them.
+/// Reads torque commands, as the process that owns the motors does.
 pub fn torque_command(data: &[u8]) {
     let command: TorqueCommand = value_of(data);
     let (torque, fallback) = (command.torque::<4>(), command.fallback_torque::<4>());
@@ -47,7 +46,7 @@ pub fn torque_command(data: &[u8]) {
     let _ = command.wants_torque();
 }
 
-/// Telemetry and replies, as the status line, the log and an operator read them.
+/// Reads telemetry and replies, as the status line, the log and an operator do.
 pub fn telemetry(data: &[u8]) {
     let telemetry: Telemetry = value_of(data);
     let _ = telemetry.state.drives();
@@ -71,7 +70,7 @@ pub fn telemetry(data: &[u8]) {
             assert!(format!("{column}={cell}").len() > 1);
         },
     );
-    // `dof` may be 0: fields per joint then have no column, but vectors have three.
+    // With a `dof` of 0, fields per joint have no column, but vectors have three.
     assert!(columns >= fields.len() - 3);
     let reply: OperatorReply = value_of(data);
     let _ = (reply.outcome(), reply.mode());

@@ -28,7 +28,7 @@ const RUNS: [&[u8]; 16] = [
 /// Maximum size of a mutated input.
 const MAX_INPUT_BYTES: usize = 1 << 16;
 
-/// One of the inputs with one to four changes.
+/// Returns one of the inputs with one to four changes.
 pub fn mutated(random: &mut Random, inputs: &[Vec<u8>]) -> Vec<u8> {
     let mut input = inputs[random.index(inputs.len())].clone();
     for _ in 0..=random.index(4) {
@@ -60,7 +60,7 @@ fn change(random: &mut Random, input: &mut Vec<u8>, inputs: &[Vec<u8>]) {
             input.drain(index..index + gone);
         }
         7 => {
-            // Insert a part of any input here, or replace bytes by it.
+            // A part of any input is inserted here, or replaces bytes.
             let other = &inputs[random.index(inputs.len())];
             let from = random.index(other.len() + 1);
             let length = random.index((other.len() - from).min(512) + 1);

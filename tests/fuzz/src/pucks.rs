@@ -1,4 +1,4 @@
-//! Frames of the arm's bus, one target per decoder.
+//! Fuzz targets of Barrett's frames, one for each decoder.
 
 use supple_can_frame::{CanFrame, timing};
 use supple_puck::force_torque::{Quantity, SensorReading};
@@ -19,12 +19,12 @@ fn frame(data: &[u8]) -> Option<CanFrame> {
     frame.ok()
 }
 
-/// Id of a frame that [`frame`] has built.
+/// Returns the id of a frame that [`frame`] has built.
 fn id_of(frame: &CanFrame) -> MessageId {
     MessageId::of(frame).expect("a classic frame with an 11-bit id")
 }
 
-/// Any frame that reaches the host.
+/// Parses any frame to the host.
 pub fn inbound(data: &[u8]) {
     let Some(frame) = frame(data) else {
         return;
@@ -36,7 +36,7 @@ pub fn inbound(data: &[u8]) {
     assert!(bits >= timing::min_bits(frame.dlc()) && bits <= timing::max_bits(frame.dlc()));
 }
 
-/// Property messages and replies, and the meaning of their ids.
+/// Parses property messages and replies, and looks up their ids.
 pub fn property(data: &[u8]) {
     let Some(frame) = frame(data) else {
         return;
@@ -58,7 +58,7 @@ pub fn property(data: &[u8]) {
     }
 }
 
-/// Position replies.
+/// Parses position replies.
 pub fn position(data: &[u8]) {
     let Some(frame) = frame(data) else {
         return;
@@ -69,7 +69,7 @@ pub fn position(data: &[u8]) {
     }
 }
 
-/// Packed torques.
+/// Parses packed torques.
 pub fn torque(data: &[u8]) {
     let Some(frame) = frame(data) else {
         return;
@@ -80,7 +80,7 @@ pub fn torque(data: &[u8]) {
     }
 }
 
-/// Frames of the force/torque sensor.
+/// Parses frames of the force/torque sensor.
 pub fn force_torque(data: &[u8]) {
     let Some(frame) = frame(data) else {
         return;
@@ -94,7 +94,7 @@ pub fn force_torque(data: &[u8]) {
     }
 }
 
-/// The state word of the pendant, four bytes.
+/// Parses the state word of the pendant, four bytes.
 pub fn pendant(data: &[u8]) {
     let Some(data) = data.first_chunk() else {
         return;
@@ -106,7 +106,7 @@ pub fn pendant(data: &[u8]) {
     }
 }
 
-/// Property values of modes, roles and limits, four bytes.
+/// Parses property values of modes, roles and limits, four bytes.
 pub fn values(data: &[u8]) {
     let Some(data) = data.first_chunk() else {
         return;

@@ -1,4 +1,4 @@
-//! Requests of an operator: from bytes to a request, through the checks of the controller.
+//! Fuzz target of operator requests: decodes bytes to requests and passes them through the checks of the controller.
 
 use crate::bytes::values_of;
 use std::sync::OnceLock;
@@ -17,7 +17,7 @@ const HOLDING: u64 = 300;
 /// Time in which the safe action may remove the complete torque of a joint \[s\].
 const STOP_TORQUE_S: f64 = 0.005;
 
-/// The controller of the built-in arm with four joints.
+/// Returns the controller of the built-in arm with four joints.
 pub fn controller() -> &'static Controller<4> {
     static CONTROLLER: OnceLock<Controller<4>> = OnceLock::new();
     CONTROLLER.get_or_init(|| {
@@ -35,14 +35,14 @@ fn home() -> &'static Vector<4> {
     HOME.get_or_init(|| description().home().expect("four joints"))
 }
 
-/// Input of a cycle with the arm at rest in its home pose, converted from a message.
+/// Returns the input of a cycle with the arm at rest in its home pose, converted from a message.
 pub fn at_rest(cycle: u64, request: Option<Request<4>>) -> Input<4> {
     crate::seed::state_at_rest(cycle, home())
         .input(request)
         .expect("four joints")
 }
 
-/// State and output in gravity hold with settled torques.
+/// Returns state and output in gravity hold with settled torques.
 fn holding() -> &'static (State<4>, Output<4>) {
     static HELD: OnceLock<(State<4>, Output<4>)> = OnceLock::new();
     HELD.get_or_init(|| {
@@ -74,8 +74,8 @@ pub fn operator_request(data: &[u8]) {
         };
         if let Some(request) = &request {
             let again = OperatorRequest::new(message.operator, message.sequence, None, request);
-            let again = again.request::<4>().expect("it was a request");
-            // Compared as text: a request may contain NaN.
+            let again = again.request::<4>().expect("the message is a request");
+            // The requests are compared as text, because a request may contain NaN.
             assert_eq!(format!("{again:?}"), format!("{:?}", Some(request)));
         }
         for k in 0..CYCLES {

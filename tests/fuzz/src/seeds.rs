@@ -23,7 +23,7 @@ use supple_ipc::message::{
 };
 use supple_model::Description;
 
-/// Seeds of a target.
+/// Returns the seeds of a target.
 ///
 /// # Panics
 /// If there is no target of this name.
@@ -111,7 +111,7 @@ fn arm_states() -> Vec<Seed> {
     ]
 }
 
-/// State and output of a step in gravity hold.
+/// Returns state and output of a step in gravity hold.
 fn held() -> (ArmState, Output<4>) {
     let mut state = State::new(controller());
     step(controller(), &mut state, &at_rest(0, None));
@@ -239,7 +239,7 @@ fn definitions() -> Vec<Seed> {
         (name.to_owned(), bytes)
     };
     let numbers = [&[0, 1, 0, 0][..], &[0; 10]].concat();
-    // Three structures of five bytes each, the second and third aligned to four bytes, and an empty string.
+    // The message has three structures of five bytes, the second and third aligned to four bytes, and an empty string.
     let nested = [&[0, 1, 0, 0][..], &[0; 24], &[1, 0, 0, 0, 0]].concat();
     vec![
         with("numbers", "float64 x\nint8[2] y\n", &numbers),

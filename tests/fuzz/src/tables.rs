@@ -1,4 +1,4 @@
-//! Tables of measurements, and the motion of a design file.
+//! Fuzz target of tables of measurements and of the motion in a design file.
 
 use crate::bytes::with_file;
 use supple_core::trajectory::Fourier;

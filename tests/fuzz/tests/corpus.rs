@@ -29,7 +29,7 @@ fn committed(target: &Target) -> Vec<(PathBuf, Vec<u8>)> {
     files.into_iter().map(read).collect()
 }
 
-/// Runs the target; names and saves an input that makes it fail.
+/// Runs the target; reports and saves an input that makes it fail.
 fn survives(target: &Target, input: &[u8], what: &dyn Fn() -> String) {
     let body = target.body;
     if let Err(panic) = std::panic::catch_unwind(|| body(input)) {
@@ -121,7 +121,7 @@ fn every_target_has_valid_inputs_committed() {
     }
 }
 
-/// The targets must accept the seeds; a fuzzer that starts from rejected inputs never gets past the validation.
+/// The targets must accept the seeds, because a fuzzer that starts from rejected inputs does not get past the validation.
 #[test]
 fn the_targets_accept_their_seeds() {
     for (name, bytes) in seeds::of("log_schema") {

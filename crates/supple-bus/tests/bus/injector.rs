@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use supple_bus::virtual_time::{DirectBus, EmulatedNodes};
-use supple_bus::{Bus, BusFault, Event, FaultInjector, FaultKind, FaultRule, Traffic};
+use supple_bus::{Bus, BusFault, Event, FaultInjector, FaultKind, FaultRule, TrafficDirection};
 use supple_can_frame::{CanFrame, CanId};
 
 /// Records the frames that the host sends, and gives the host its scripted events.
@@ -42,7 +42,7 @@ fn frame(id: u32, payload: &[u8]) -> CanFrame {
     CanFrame::from_raw(id, payload).unwrap()
 }
 
-/// A bus with this rule and with frames for the host at 10, 20, 30 and 40 ns, numbered 1 to 4.
+/// Returns a bus with this rule, on which the host receives frames 1 to 4 at 10, 20, 30 and 40 ns.
 fn bus_with_four_frames(rule: FaultRule) -> FaultInjector<DirectBus<ScriptedNodes>> {
     let events = (1..=4u8).map(|i| (u64::from(i) * 10, Event::Frame(frame(0x423, &[0, 0, i]))));
     let script = ScriptedNodes {
@@ -54,7 +54,7 @@ fn bus_with_four_frames(rule: FaultRule) -> FaultInjector<DirectBus<ScriptedNode
     bus
 }
 
-/// Last payload byte and time of every frame received until 100 ns.
+/// Receives until 100 ns; returns the last payload byte and the time of every received frame.
 fn received(bus: &mut impl Bus) -> Vec<(u8, u64)> {
     let mut frames = Vec::new();
     while let Some(event) = bus.receive_until(100).unwrap() {
@@ -67,7 +67,7 @@ fn received(bus: &mut impl Bus) -> Vec<(u8, u64)> {
 }
 
 fn on_third_frame(kind: FaultKind) -> FaultRule {
-    FaultRule::always(Traffic::Received, kind).within(30, 31)
+    FaultRule::always(TrafficDirection::Received, kind).within(30, 31)
 }
 
 #[test]
@@ -123,7 +123,7 @@ fn corruption_inverts_one_bit() {
 fn a_lost_frame_is_confirmed_and_a_silently_lost_one_is_not() {
     for (kind, confirmed) in [(FaultKind::Loss, true), (FaultKind::SilentLoss, false)] {
         let mut bus = FaultInjector::new(DirectBus(ScriptedNodes::default()), 1);
-        bus.add(FaultRule::always(Traffic::Sent, kind));
+        bus.add(FaultRule::always(TrafficDirection::Sent, kind));
         let sent = frame(0x401, &[0xaa; 8]);
         bus.send(&sent).unwrap();
         let event = bus.receive_until(50).unwrap();
@@ -135,7 +135,10 @@ fn a_lost_frame_is_confirmed_and_a_silently_lost_one_is_not() {
 #[test]
 fn a_delayed_frame_is_confirmed_when_it_is_sent() {
     let mut bus = FaultInjector::new(DirectBus(ScriptedNodes::default()), 1);
-    bus.add(FaultRule::always(Traffic::Sent, FaultKind::Delay(30)));
+    bus.add(FaultRule::always(
+        TrafficDirection::Sent,
+        FaultKind::Delay(30),
+    ));
     let sent = frame(0x401, &[0xaa; 8]);
     bus.send(&sent).unwrap();
     assert_eq!(bus.receive_until(29).unwrap(), None);
@@ -145,8 +148,9 @@ fn a_delayed_frame_is_confirmed_when_it_is_sent() {
 
 #[test]
 fn bus_off_blocks_all_frames_and_reports_start_and_end() {
-    let mut bus =
-        bus_with_four_frames(FaultRule::always(Traffic::Sent, FaultKind::BusOff).within(15, 35));
+    let mut bus = bus_with_four_frames(
+        FaultRule::always(TrafficDirection::Sent, FaultKind::BusOff).within(15, 35),
+    );
     let mut events = Vec::new();
     while let Some(event) = bus.receive_until(100).unwrap() {
         events.push((bus.now_ns(), event));
@@ -171,7 +175,7 @@ fn bus_off_blocks_all_frames_and_reports_start_and_end() {
 fn rules_affect_only_their_frames() {
     let mut bus = FaultInjector::new(DirectBus(ScriptedNodes::default()), 1);
     let torques = |id: CanId| id.raw() == 0x401;
-    bus.add(FaultRule::always(Traffic::Sent, FaultKind::SilentLoss).only(torques));
+    bus.add(FaultRule::always(TrafficDirection::Sent, FaultKind::SilentLoss).only(torques));
     bus.send(&frame(0x401, &[0xaa; 8])).unwrap();
     bus.send(&frame(0x404, &[0x30])).unwrap();
     let received: Vec<_> = bus
@@ -188,7 +192,7 @@ fn rules_affect_only_their_frames() {
 fn losses_follow_the_probability_and_repeat_with_the_seed() {
     let received_with_seed = |seed| {
         let mut bus = FaultInjector::new(DirectBus(ScriptedNodes::default()), seed);
-        let rule = FaultRule::always(Traffic::Sent, FaultKind::SilentLoss);
+        let rule = FaultRule::always(TrafficDirection::Sent, FaultKind::SilentLoss);
         bus.add(rule.with_probability(0.25));
         for i in 0..4000u32 {
             bus.send(&frame(0x401, &i.to_le_bytes())).unwrap();

@@ -1,4 +1,4 @@
-//! Injected faults, sockets and frames. Tests that need a CAN interface or count allocations are separate test
+//! Tests of injected faults, sockets and frames. Tests that need a CAN interface or count allocations are separate
 //! programs.
 
 #[path = "../../../../tests/support/property.rs"]

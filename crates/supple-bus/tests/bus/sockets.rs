@@ -1,4 +1,4 @@
-//! Sockets and folders: ownership, and behaviour without the other side.
+//! Access rights of sockets and folders, and behaviour of a bus without the other side.
 
 use std::os::unix::fs::PermissionsExt;
 use supple_bus::virtual_time::LockstepBus;
@@ -37,7 +37,7 @@ fn a_folder_open_to_others_is_rejected() {
 }
 
 #[test]
-fn a_side_belongs_to_one_process_and_can_be_reopened() {
+fn a_side_can_be_opened_once_and_again_after_it_is_closed() {
     let temporary = tempfile::tempdir().unwrap();
     let folder = OwnerFolder::open(temporary.path().join("bus")).unwrap();
     let first = DatagramBus::open(&folder, Side::Host).unwrap();
@@ -54,7 +54,7 @@ fn a_side_belongs_to_one_process_and_can_be_reopened() {
 fn a_socket_left_behind_is_replaced() {
     let temporary = tempfile::tempdir().unwrap();
     let folder = OwnerFolder::open(temporary.path().join("bus")).unwrap();
-    // As a killed process leaves it: bound, without a listener.
+    // A killed process leaves such a socket: bound, without a listener.
     drop(std::os::unix::net::UnixDatagram::bind(folder.path().join("host.can")).unwrap());
     DatagramBus::open(&folder, Side::Host).unwrap();
 }
@@ -80,7 +80,7 @@ fn frames_are_not_acknowledged_until_a_peer_connects() {
 
 /// If the arm stops reading, the queue fills, which is an error.
 #[test]
-fn a_full_queue_is_an_error_and_nothing_is_confirmed() {
+fn send_fails_when_the_queue_is_full_and_only_sent_frames_are_confirmed() {
     let temporary = tempfile::tempdir().unwrap();
     let folder = OwnerFolder::open(temporary.path().join("bus")).unwrap();
     let mut host = DatagramBus::open(&folder, Side::Host).unwrap();
@@ -92,7 +92,7 @@ fn a_full_queue_is_an_error_and_nothing_is_confirmed() {
             Ok(()) => sent += 1,
             Err(error) => break error,
         }
-        assert!(sent < 10_000, "no queue is so long");
+        assert!(sent < 10_000, "the queue does not fill");
     };
     assert!(matches!(refused, BusError::Full));
     let mut confirmed = 0;
@@ -135,11 +135,11 @@ fn virtual_time_requires_a_running_arm() {
 }
 
 #[test]
-fn a_missing_interface_is_named_with_a_remedy() {
+fn the_error_of_a_missing_interface_has_its_name_and_a_remedy() {
     let error = SocketCan::open("no_such_can").unwrap_err().to_string();
     assert!(error.contains("`no_such_can`"), "{error}");
     assert!(
-        error.contains("ip -details link") || error.contains("no CAN"),
+        error.contains("ip -details link") || error.contains("no CAN support"),
         "{error}"
     );
 }

@@ -1,4 +1,5 @@
-//! Every backend with an echo node on the arm's side; the first element of the pair keeps that node running.
+//! Opens every backend with an echo node on the arm's side. Each function returns the echo node, which runs until it is
+//! dropped, and the host's bus.
 
 use crate::echo::{EchoNodes, EchoThread};
 use supple_bus::virtual_time::{DirectBus, LockstepBus, LockstepResponder};
@@ -11,7 +12,7 @@ use tempfile::TempDir;
 type Arm = (Option<EchoThread>, Option<TempDir>);
 type Opened = Option<(Arm, Box<dyn Bus>)>;
 
-/// A `vcan` interface for the tests; another name may be given in the environment.
+/// Returns the name of the CAN interface for the tests.
 fn interface() -> String {
     std::env::var("SUPPLE_CAN_INTERFACE").unwrap_or_else(|_| "vcan0".into())
 }
@@ -52,8 +53,8 @@ pub fn datagram() -> Opened {
     Some((arm, Box::new(bus)))
 }
 
-/// `None`, with the reason printed, if the kernel has no such interface. Tests of one interface run one after
-/// another, because every socket on it receives every frame.
+/// Opens the CAN interface; if the kernel has none, prints the reason and returns `None`. The tests of this backend run
+/// one after another, because every socket on the interface receives every frame.
 pub fn socket_can() -> Opened {
     let name = interface();
     let bus = match SocketCan::open(&name) {

@@ -1,4 +1,4 @@
-//! The arm's side of the bus: a node that echoes every frame of the host, as a peer in virtual time and as a thread.
+//! The arm's side of the bus: a node that echoes every frame of the host, in virtual time or in a thread.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use supple_can_frame::{CanFrame, CanId};
 /// Transmission time of a frame in virtual time \[ns\].
 const FRAME_NS: u64 = 100_000;
 
-/// The node's answer to a frame of the host: the same payload in the same format.
+/// Returns the answer of the echo node to a frame of the host: the same payload in the same format.
 pub fn echo_of(frame: &CanFrame) -> CanFrame {
     CanFrame::of_format(
         CanId::standard(0x426).unwrap(),
@@ -55,7 +55,7 @@ impl EmulatedNodes for EchoNodes {
     }
 }
 
-/// Echoes frames in a thread, which ends when this is dropped.
+/// A thread that echoes frames; it ends when this value is dropped.
 pub struct EchoThread {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,

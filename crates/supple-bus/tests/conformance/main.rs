@@ -1,6 +1,6 @@
-//! One suite of the guarantees to a host, run on every backend and through the fault injector.
+//! Tests of what a bus guarantees to the host, run on every backend and through the fault injector.
 //!
-//! The arm's side echoes: its node answers each frame of the host with a frame of the same payload.
+//! The arm's side is an echo node: it answers each frame of the host with a frame of the same payload.
 
 mod backends;
 mod echo;
@@ -25,14 +25,14 @@ macro_rules! on_every_backend {
     ($($backend:ident),*) => {
         $(conformance!($backend:
             a_frame_is_confirmed_once_and_then_answered,
-            every_length_and_id_crosses_unchanged,
-            frames_keep_their_order,
-            every_length_of_fd_and_extended_ids_cross_unchanged,
-            a_cycle_of_frames_is_not_lost,
+            frames_of_every_length_and_id_arrive_unchanged,
+            frames_arrive_in_the_order_in_which_they_were_sent,
+            fd_frames_of_every_length_with_either_id_format_arrive_unchanged,
+            no_frame_of_repeated_cycles_is_lost,
             lookahead_gives_the_same_events_in_the_same_order,
-            waiting_ends_at_the_deadline,
-            a_deadline_in_the_past_returns_without_waiting,
-            time_never_goes_back,
+            receive_without_events_returns_at_the_deadline,
+            receive_with_a_past_deadline_returns_without_waiting,
+            bus_time_never_decreases,
         );)*
     };
 }

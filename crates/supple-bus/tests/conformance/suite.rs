@@ -1,21 +1,21 @@
-//! The cases. Each gets the host's bus.
+//! Conformance tests of a bus. Each test receives the host's side of the bus under test.
 
 use crate::echo::echo_of;
 use supple_bus::{Bus, BusError, Event};
 use supple_can_frame::{CanFrame, CanId};
 
-/// Long enough for a thread to be scheduled on a busy machine; reached only on failure.
+/// Timeout of an answer: long enough for a thread to be scheduled on a busy machine \[ns\]. Only a failed test reaches it.
 const ANSWER_TIMEOUT_NS: u64 = 10_000_000_000;
-/// Wait time of the tests of waiting.
+/// Duration of a wait without events \[ns\].
 const WAIT_NS: u64 = 3_000_000;
 
-type Subject = Box<dyn Bus>;
+type BusUnderTest = Box<dyn Bus>;
 
 fn frame(id: u32, payload: &[u8]) -> CanFrame {
     CanFrame::from_raw(id, payload).unwrap()
 }
 
-fn next(bus: &mut Subject) -> Event {
+fn next(bus: &mut BusUnderTest) -> Event {
     let until_ns = bus.now_ns() + ANSWER_TIMEOUT_NS;
     loop {
         if let Some(event) = bus.receive_until(until_ns).unwrap() {
@@ -25,8 +25,8 @@ fn next(bus: &mut Subject) -> Event {
     }
 }
 
-/// Confirmations and answers, each in order.
-fn collect(bus: &mut Subject, frames: usize) -> (Vec<CanFrame>, Vec<CanFrame>) {
+/// Receives until `frames` frames are confirmed and answered; returns the confirmed frames and the answers, each in order.
+fn collect(bus: &mut BusUnderTest, frames: usize) -> (Vec<CanFrame>, Vec<CanFrame>) {
     let (mut sent, mut answers) = (Vec::new(), Vec::new());
     while sent.len() < frames || answers.len() < frames {
         match next(bus) {
@@ -38,7 +38,7 @@ fn collect(bus: &mut Subject, frames: usize) -> (Vec<CanFrame>, Vec<CanFrame>) {
     (sent, answers)
 }
 
-pub fn a_frame_is_confirmed_once_and_then_answered(mut bus: Subject) {
+pub fn a_frame_is_confirmed_once_and_then_answered(mut bus: BusUnderTest) {
     let poll = frame(0x404, &[0x30]);
     bus.send(&poll).unwrap();
     assert_eq!(next(&mut bus), Event::Sent(poll));
@@ -47,7 +47,7 @@ pub fn a_frame_is_confirmed_once_and_then_answered(mut bus: Subject) {
     assert_eq!(bus.receive_until(until_ns).unwrap(), None);
 }
 
-pub fn every_length_and_id_crosses_unchanged(mut bus: Subject) {
+pub fn frames_of_every_length_and_id_arrive_unchanged(mut bus: BusUnderTest) {
     let payload = [0x80, 0, 0xff, 1, 0x55, 0xaa, 0x7f, 0xfe];
     for (length, id) in [
         0x000, 0x001, 0x0ff, 0x400, 0x401, 0x404, 0x41f, 0x01f, 0x00a,
@@ -64,8 +64,8 @@ pub fn every_length_and_id_crosses_unchanged(mut bus: Subject) {
     }
 }
 
-/// Frames of CAN FD on a bus that carries them; on another one, sending them is refused.
-pub fn every_length_of_fd_and_extended_ids_cross_unchanged(mut bus: Subject) {
+/// A bus without CAN FD refuses to send the FD frames.
+pub fn fd_frames_of_every_length_with_either_id_format_arrive_unchanged(mut bus: BusUnderTest) {
     let extended = CanId::extended(0x1234_5678).unwrap();
     let classic = CanFrame::new(extended, &[1, 2, 3]).unwrap();
     let payload: Vec<u8> = (0..64).collect();
@@ -86,7 +86,7 @@ pub fn every_length_of_fd_and_extended_ids_cross_unchanged(mut bus: Subject) {
     }
 }
 
-pub fn frames_keep_their_order(mut bus: Subject) {
+pub fn frames_arrive_in_the_order_in_which_they_were_sent(mut bus: BusUnderTest) {
     let sent: Vec<_> = (0..5).map(|i| frame(0x401, &[i])).collect();
     for frame in &sent {
         bus.send(frame).unwrap();
@@ -97,8 +97,8 @@ pub fn frames_keep_their_order(mut bus: Subject) {
     assert_eq!(answers, expected);
 }
 
-/// Repeats a cycle of a seven-joint arm.
-pub fn a_cycle_of_frames_is_not_lost(mut bus: Subject) {
+/// Each cycle sends eight frames, as for an arm of seven joints.
+pub fn no_frame_of_repeated_cycles_is_lost(mut bus: BusUnderTest) {
     for cycle in 0..200u8 {
         let sent: Vec<_> = (0..8)
             .map(|i| frame(0x400 | u32::from(i), &[cycle, i]))
@@ -112,8 +112,7 @@ pub fn a_cycle_of_frames_is_not_lost(mut bus: Subject) {
     }
 }
 
-/// With lookahead a host receives the same events in the same order, up to the same time.
-pub fn lookahead_gives_the_same_events_in_the_same_order(mut bus: Subject) {
+pub fn lookahead_gives_the_same_events_in_the_same_order(mut bus: BusUnderTest) {
     let sent: Vec<_> = (0..4).map(|i| frame(0x404, &[i])).collect();
     for frame in &sent {
         bus.send(frame).unwrap();
@@ -128,7 +127,7 @@ pub fn lookahead_gives_the_same_events_in_the_same_order(mut bus: Subject) {
             other => panic!("{other:?}"),
         }
     }
-    // The time is that of the last answer, not the end of the wait.
+    // The bus time is the time of the last answer, not the end of the wait.
     assert!(bus.now_ns() < until_ns);
     assert_eq!(confirmed, sent);
     assert_eq!(answers, sent.iter().map(echo_of).collect::<Vec<_>>());
@@ -137,14 +136,14 @@ pub fn lookahead_gives_the_same_events_in_the_same_order(mut bus: Subject) {
     assert!(bus.now_ns() >= until_ns);
 }
 
-pub fn waiting_ends_at_the_deadline(mut bus: Subject) {
+pub fn receive_without_events_returns_at_the_deadline(mut bus: BusUnderTest) {
     let until_ns = bus.now_ns() + WAIT_NS;
-    // A signal may end a wait of the kernel early, but not that of the bus.
+    // A signal may end the wait in the kernel early; the bus then continues to wait.
     assert_eq!(bus.receive_until(until_ns).unwrap(), None);
     assert!(bus.now_ns() >= until_ns);
 }
 
-pub fn a_deadline_in_the_past_returns_without_waiting(mut bus: Subject) {
+pub fn receive_with_a_past_deadline_returns_without_waiting(mut bus: BusUnderTest) {
     assert_eq!(bus.receive_until(0).unwrap(), None);
     let poll = frame(0x404, &[0x30]);
     bus.send(&poll).unwrap();
@@ -152,7 +151,7 @@ pub fn a_deadline_in_the_past_returns_without_waiting(mut bus: Subject) {
     assert_eq!(bus.receive_until(0).unwrap(), None);
 }
 
-pub fn time_never_goes_back(mut bus: Subject) {
+pub fn bus_time_never_decreases(mut bus: BusUnderTest) {
     let mut last_ns = bus.now_ns();
     for i in 0..20u8 {
         bus.send(&frame(0x404, &[i])).unwrap();

@@ -1,4 +1,4 @@
-//! Bits and durations: published bounds, and a second count that writes every bit down.
+//! Numbers of bits and durations, compared with published bounds and with a second implementation that lists every bit.
 
 use proptest::prelude::*;
 use supple_can_frame::timing::{Bits, FrameLayout, bits, max_bits, min_bits};
@@ -17,7 +17,7 @@ fn extended(dlc: u8) -> FrameLayout {
 }
 
 #[test]
-fn bounds_are_those_of_the_standard() {
+fn bit_counts_equal_the_bounds_of_the_standard() {
     // 8 bytes: 111 to 135 bits with a standard id, 131 to 160 with an extended one.
     assert_eq!((min_bits(8), max_bits(8)), (111, 135));
     let extended = FrameLayout {
@@ -31,8 +31,8 @@ fn bounds_are_those_of_the_standard() {
     assert_eq!((min, max), ((29, 97), (33, 114)));
 }
 
-/// Command and reply of seven motors, bounds \[us\]: 8 bytes each; 48 and 24 bytes with an extended id in the
-/// command; 20 and 16 bytes.
+/// Compares the durations of command and reply of seven motors with known bounds \[us\]: 8 bytes each; 48 and 24 bytes
+/// with an extended id in the command; 20 and 16 bytes.
 #[test]
 fn cycles_of_seven_motors_take_their_known_times() {
     let us = |rates: BitRates, shapes: [FrameLayout; 2]| {
@@ -53,7 +53,7 @@ fn cycles_of_seven_motors_take_their_known_times() {
     assert_eq!(us(fd, lengths(11, 10)), (1042, 1231));
 }
 
-/// An FD bus sends classic frames at the nominal rate, and FD frames without a bit rate switch too.
+/// An FD bus sends classic frames and FD frames without a bit rate switch at the nominal rate.
 #[test]
 fn only_frames_with_the_switch_use_the_data_rate() {
     let id = CanId::standard(0x123).unwrap();
@@ -70,7 +70,7 @@ fn only_frames_with_the_switch_use_the_data_rate() {
     assert!(rates.duration_ns(&fast) < rates.duration_ns(&slow) / 2);
 }
 
-/// Bits of an FD frame from the start bit to the end of its payload, without stuff bits.
+/// Lists the bits of an FD frame from the start bit to the end of its payload, without stuff bits.
 fn fd_head(frame: &CanFrame, bit_rate_switch: bool) -> Vec<bool> {
     let mut written = vec![false];
     let mut write = |value: u32, count: u32| {
@@ -96,7 +96,7 @@ fn fd_head(frame: &CanFrame, bit_rate_switch: bool) -> Vec<bool> {
     written
 }
 
-/// Number of bits with stuff bits; none follows the last bit, where a fixed one stands.
+/// Counts the bits including stuff bits; after the last bit, a fixed stuff bit takes the place of a stuff bit.
 fn stuffed(bits: &[bool]) -> usize {
     let mut sent: Vec<bool> = Vec::new();
     for (index, bit) in bits.iter().enumerate() {
@@ -114,7 +114,7 @@ proptest! {
     #![proptest_config(crate::property::config(512, 20_261_102))]
 
     #[test]
-    fn fd_bits_equal_those_written_down(
+    fn fd_bit_counts_equal_those_of_the_listed_bits(
         raw in 0u32..0x2000_0000,
         is_extended in any::<bool>(),
         bit_rate_switch in any::<bool>(),

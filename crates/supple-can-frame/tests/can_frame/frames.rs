@@ -1,4 +1,4 @@
-//! Ids, lengths and codes.
+//! Tests of ids, payload lengths and data length codes.
 
 use proptest::prelude::*;
 use supple_can_frame::{CanFrame, CanId, FrameError, FrameFormat};
@@ -7,7 +7,7 @@ use supple_can_frame::{CanFrame, CanId, FrameError, FrameFormat};
 const FD_LENGTHS: [usize; 16] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 12, 16, 20, 24, 32, 48, 64];
 
 #[test]
-fn fd_frames_carry_the_lengths_of_the_standard_and_no_other() {
+fn fd_frames_accept_only_the_payload_lengths_of_the_standard() {
     let id = CanId::standard(1).unwrap();
     for length in 0..=80 {
         let payload = vec![0xa5; length];
@@ -46,7 +46,7 @@ fn frames_of_two_formats_or_kinds_of_id_differ() {
     assert_eq!(standard.as_standard(), Some(5));
 }
 
-/// Bits of the arbitration field; the lower one wins because zero is dominant.
+/// Lists the bits of the arbitration field. The lower list wins the arbitration, because zero is dominant.
 fn arbitration_bits(id: CanId) -> Vec<bool> {
     let raw = id.raw();
     let bits = |value: u32, count: u32| (0..count).rev().map(move |i| value >> i & 1 == 1);

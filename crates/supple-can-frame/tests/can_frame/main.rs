@@ -1,4 +1,4 @@
-//! Frames, their bits and their durations.
+//! Tests of frames, their numbers of bits and their durations.
 
 #[path = "../../../../tests/support/property.rs"]
 mod property;

@@ -1,4 +1,4 @@
-//! Types of drives on a bus: a folder each. [`registry`](crate::registry) names them.
+//! Types of drives on a bus, one folder for each. [`registry`](crate::registry) lists them.
 
 pub mod barrett;
 pub mod damiao;

@@ -1,4 +1,4 @@
-//! The real program: invalid arguments are reported with the remedy.
+//! Runs the program `supple-can`: it reports invalid arguments with a remedy.
 
 use std::process::{Command, Output};
 

@@ -1,3 +1,3 @@
-//! The program that owns the arm's bus.
+//! Tests of the program that owns the arm's bus.
 
 mod command_line;

@@ -17,22 +17,22 @@ pub struct DemoArgs {
     pub urdf: UrdfArgs,
     /// The controller's model of the arm, for example the output of `supple identify`: path of its TOML or folder.
     /// Default: the plant's own parameters, with the perturbations that each experiment defines. Without options of
-    /// the simulated arm, each of --realistic-seeds is calibrated and uses its own model, not this one.
+    /// the simulated arm, the arm of each of --realistic-seeds is calibrated and uses its own model instead of this one.
     #[arg(long, value_name = "PATH")]
     pub model: Option<PathBuf>,
-    /// Folder for all results. Files in it of the same names are replaced, others are left alone.
+    /// Folder for all results. Existing files of the same names are replaced, other files are kept.
     #[arg(long, value_name = "DIR", default_value = "out/demo")]
     pub out: PathBuf,
     /// Seed of the perturbed models and of all noise.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Print the summary as JSON instead of a table; an error is then an object on standard output too.
+    /// Print the summary as JSON instead of a table; an error is then also an object on standard output.
     #[arg(long)]
     pub json: bool,
     /// Print results only, no progress.
     #[arg(long)]
     pub quiet: bool,
-    /// Write no logs; all of them take about half a gigabyte.
+    /// Write no logs; together they take about half a gigabyte.
     #[arg(long)]
     pub no_logs: bool,
     /// Number of calibrated arms with the effects of a real one; 0 leaves these runs out.

@@ -30,10 +30,10 @@ pub enum IdentificationCommand {
     /// the demo runs with the result. With --plant the steps are those for a real arm, also on simulated ones.
     #[command(after_help = CODES)]
     Calibrate(CalibrateArgs),
-    /// Identify the paper's own arm by the paper's own procedure, Eq. (3.7) and (3.8), in simulation.
+    /// Identify the paper's arm by the paper's procedure, Eq. (3.7) and (3.8), in simulation.
     ///
-    /// Coulomb friction from breakaway, m3 known, twelve columns, least squares over N samples of an excitation; beside
-    /// it this program's own fit of the same arm.
+    /// The procedure takes Coulomb friction from breakaway and m3 as known, and fits twelve columns by least squares over N
+    /// samples of an excitation. For comparison, the command also runs this program's fit of the same arm.
     #[command(after_help = CODES)]
     CalibratePaper(CalibratePaperArgs),
     /// Refit friction and payload from logs of a repeated motion.
@@ -88,9 +88,9 @@ impl From<Solver> for Method {
 /// Friction columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum FrictionArg {
-    /// By cross-validation.
+    /// Chosen by cross-validation.
     Auto,
-    /// None.
+    /// No friction.
     None,
     /// Viscous.
     Viscous,
@@ -106,10 +106,10 @@ pub enum FrictionArg {
     MotorLoad,
 }
 
-/// Effects beside links and friction of the joints.
+/// Effects in addition to links and friction of the joints.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum EffectsArg {
-    /// By cross-validation: none, all but the compliance, or all.
+    /// Chosen by cross-validation: none, all except the compliance, or all.
     Auto,
     /// None.
     None,
@@ -148,7 +148,7 @@ impl From<FrictionArg> for FrictionChoice {
 pub enum TorqueDelay {
     /// Estimated for each log.
     Estimate,
-    /// Given \[s\].
+    /// Given value \[s\].
     Seconds(f64),
 }
 
@@ -206,7 +206,7 @@ pub struct IdentifyArgs {
     #[arg(long, value_enum, default_value = "auto")]
     pub friction: FrictionArg,
     /// Springs over the joints (hoses, wires), tilt of the base, compliance, and friction of motors that drive several joints:
-    /// none, all but the compliance, or all, by cross-validation. Default: auto for MCAP, none for CSV.
+    /// none, all except the compliance, or all, chosen by cross-validation. Default: auto for MCAP, none for CSV.
     #[arg(long, value_enum)]
     pub effects: Option<EffectsArg>,
     /// Weight of the given arm, in equivalent observations. Default: chosen by cross-validation.
@@ -216,7 +216,7 @@ pub struct IdentifyArgs {
     /// `estimate`. Default: 1.5 control periods for supple's own logs, which hold commands; otherwise `estimate`.
     #[arg(long, value_name = "S|estimate", value_parser = torque_delay, allow_hyphen_values = true)]
     pub torque_delay: Option<TorqueDelay>,
-    /// Fit a log although the checks against the arm found an error in it; what they found is then a warning.
+    /// Fit a log even if the checks against the arm find an error in it; the error is then a warning.
     #[arg(long)]
     pub accept_wrong_logs: bool,
     /// Standard deviation of the torque noise of each moving joint (N m). Default: estimated from the residuals.
@@ -309,7 +309,7 @@ pub struct RunArgs {
     /// Torque ripple of the plant's motors, seen at the joints (N m).
     #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
     pub ripple: f64,
-    /// Leave out that the plant's friction depends on direction and load.
+    /// Simulate the plant without friction that depends on direction and load.
     #[arg(long)]
     pub no_load_friction: bool,
     /// Skip the slow motion, which is needed to identify dry friction at low speed.
@@ -362,16 +362,16 @@ pub enum CalibrationPlant {
     Sim,
     /// A simulated arm on an emulated CAN bus: with motor pucks, safety module and pendant, or with Damiao motors.
     Emu,
-    /// An arm on a CAN bus. The operator activates a WAM at its pendant; Damiao motors are enabled without one.
+    /// An arm on a CAN bus. The operator activates a WAM on its pendant; the program enables Damiao motors.
     Can,
-    /// The arm of a system that runs already; another model is loaded by starting that again.
+    /// The arm of a running system; loading another model requires a restart of that system.
     Running,
 }
 
 /// Arguments of `calibrate`.
 #[derive(Clone, Debug, Args)]
 pub struct CalibrateArgs {
-    /// Calibrate this arm step by step, as a real one.
+    /// Calibrate this arm step by step, as a real arm.
     #[arg(long = "plant", value_enum)]
     pub on: Option<CalibrationPlant>,
     /// Model to start from: path of its TOML or folder. Default: the arm's own.
@@ -381,10 +381,10 @@ pub struct CalibrateArgs {
     /// --seed, for example 0.15,0.5,1. For simulated arms.
     #[arg(long, value_name = "GRAVITY,FRICTION[,INERTIA]", value_delimiter = ',', requires = "on", value_parser = between(0.0, 1.0))]
     pub start_error: Vec<f64>,
-    /// The swept space is free: do not ask.
+    /// Confirm that the space swept by the arm is free; the program does not ask.
     #[arg(long, requires = "on")]
     pub yes: bool,
-    /// Go on after the last finished step of the calibration in --out.
+    /// Continue after the last finished step of the calibration in --out.
     #[arg(long, requires = "on")]
     pub resume: bool,
     /// Perform no step after this one, for example wiring, breakaway or validation_motion.
@@ -405,7 +405,7 @@ pub struct CalibrateArgs {
     /// The arm's bus, can:NAME or unix:FOLDER. Default: can:can0 for `can`, private sockets for `emu`.
     #[arg(long, value_name = "BUS", requires = "on")]
     pub bus: Option<String>,
-    /// Declare that the arm is in its home pose now; used if the motor pucks have lost their positions.
+    /// Declare that the arm is in its home pose now; used if the motor pucks have lost their position reference.
     #[arg(long, requires = "on")]
     pub zero_at_home: bool,
     /// Inject a fault into the simulated or emulated arm, as `supple up --inject`.
@@ -417,7 +417,7 @@ pub struct CalibrateArgs {
     /// Prefix of the system. Default: SUPPLE_PREFIX or `supple`.
     #[arg(long, value_name = "NAME", requires = "on")]
     pub prefix: Option<String>,
-    /// Run without real-time priority and without locked memory.
+    /// Run without realtime priority, locked memory or processor binding.
     #[arg(long, requires = "on")]
     pub no_realtime: bool,
     /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF: the simulated plant.
@@ -438,7 +438,7 @@ pub struct CalibrateArgs {
     /// Torque ripple of the plant's motors, seen at the joints (N m).
     #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
     pub ripple: f64,
-    /// Leave out that the plant's friction depends on direction and load.
+    /// Simulate the plant without friction that depends on direction and load.
     #[arg(long)]
     pub no_load_friction: bool,
     /// Stop after identification; do not run the demo.
@@ -469,7 +469,7 @@ pub struct CalibratePaperArgs {
     /// Seed of the starting model, of the design and of all noise.
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
-    /// Leave out that the plant's friction depends on direction and load.
+    /// Simulate the plant without friction that depends on direction and load.
     #[arg(long)]
     pub no_load_friction: bool,
     /// The simulated arm.

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 /// Command of `supple log`.
 #[derive(Clone, Debug, Subcommand)]
 pub enum LogCommand {
-    /// Commands that draw nothing.
+    /// Commands that draw no figures.
     #[command(flatten)]
     Data(LogDataCommand),
     /// Draw the standard figures of a log: tracking and contact, the torque terms of every joint, the timing.
@@ -28,7 +28,7 @@ pub struct PlotArgs {
     pub json: bool,
 }
 
-/// Command of `supple log` that draws nothing.
+/// Command of `supple log` that draws no figures.
 #[derive(Clone, Debug, Subcommand)]
 pub enum LogDataCommand {
     /// Show the contents of a log: arm, time span, channels, modes, faults.

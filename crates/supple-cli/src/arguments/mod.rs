@@ -30,10 +30,11 @@ pub enum OfflineCommand {
     /// Run the paper's experiments: figures, report, summary and one log per run.
     #[command(after_help = CODES)]
     Demo(DemoArgs),
-    /// Measure which effects of a real arm ruin tracking at 5 N/m: each alone, all together, calibrated or not.
+    /// Measure how much each effect of a real arm degrades tracking at 5 N/m: each effect alone and all together, with and without
+    /// calibration.
     #[command(after_help = CODES)]
     Effects(EffectsArgs),
-    /// Identify an arm, and measure what the identification needs.
+    /// Identify an arm, and measure the quantities that an identification needs.
     #[command(flatten)]
     Identification(IdentificationCommand),
     /// Make an arm from a URDF: a commented TOML with every derived setting, a drawing, and a first run in simulation.
@@ -56,12 +57,12 @@ pub struct ArmsArgs {
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
-    /// What to do instead of listing the arms.
+    /// Action instead of listing the arms.
     #[command(subcommand)]
     pub command: Option<ArmsCommand>,
 }
 
-/// What to do with a built-in arm.
+/// Action on a built-in arm.
 #[derive(Clone, Debug, Subcommand)]
 pub enum ArmsCommand {
     /// Write the TOML and the URDF of an arm into a folder, as a start for another arm.
@@ -70,7 +71,7 @@ pub enum ArmsCommand {
         arm: String,
         /// Folder of the copy; it is created if necessary.
         folder: PathBuf,
-        /// Leave out the `held` entries: the law controls every joint, as the pose mode needs it.
+        /// Leave out the `held` entries, so that the law controls every joint, as the pose mode requires.
         #[arg(long)]
         all_joints_active: bool,
         /// Replace files of an existing arm.

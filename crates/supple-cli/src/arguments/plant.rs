@@ -16,7 +16,7 @@ pub enum PlantCommand {
         #[arg(long)]
         json: bool,
     },
-    /// Print a built-in set of options as TOML, to start an own file from.
+    /// Print a built-in set of options as TOML, as a template for your own file.
     Show {
         /// Name of the set.
         #[arg(value_name = "SET", default_value = "realistic")]

@@ -1,4 +1,4 @@
-//! Feedback of the wrong motor or length, and the ambiguity with register replies.
+//! Tests of feedback from the wrong motor or of the wrong length, and of the ambiguity with register replies.
 
 use supple_damiao::feedback::FeedbackError;
 use supple_damiao::register::Operation;
@@ -23,14 +23,14 @@ fn feedback_of_another_motor_is_refused() {
 }
 
 #[test]
-fn feedback_has_eight_bytes() {
+fn feedback_of_another_length_is_refused() {
     let frame = Frame::new(0x13, &[0x13, 0x7F]).unwrap();
     assert_eq!(Feedback::parse(&frame), Err(FeedbackError::Length(2)));
 }
 
-/// A register reply looks like feedback of a disabled motor near -12.48 rad: only the request distinguishes them.
+/// A register reply has the form of feedback of a disabled motor near -12.48 rad; only the request distinguishes them.
 #[test]
-fn a_register_reply_could_be_feedback() {
+fn a_register_reply_also_parses_as_feedback() {
     let frame = Frame::new(0x13, &[0x03, 0x00, 0x33, 0x0A, 1, 0, 0, 0]).unwrap();
     assert!(RegisterReply::parse(&frame, 3, Operation::Read, Register::MODE).is_some());
     let feedback = Feedback::of_motor(&frame, 3).unwrap();
@@ -40,7 +40,7 @@ fn a_register_reply_could_be_feedback() {
 }
 
 #[test]
-fn every_code_has_a_state_and_only_one_carries_torque() {
+fn every_code_has_a_status_and_only_one_has_torque() {
     for code in 0..16 {
         let status = Status::from_code(code);
         assert_eq!(status.code(), code);
@@ -52,9 +52,9 @@ fn every_code_has_a_state_and_only_one_carries_torque() {
 }
 
 #[test]
-fn frames_cross_the_bus_in_both_formats() {
+fn frames_convert_to_and_from_both_bus_formats() {
     use supple_can_frame::{CanFrame, CanId, FrameFormat};
-    let frame = supple_damiao::Special::Enable.emit(2);
+    let frame = supple_damiao::SpecialCommand::Enable.emit(2);
     for format in [
         FrameFormat::Classic,
         FrameFormat::Fd {

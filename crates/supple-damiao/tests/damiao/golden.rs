@@ -1,8 +1,8 @@
-//! The golden frames: every row of `data/golden.csv`.
+//! Compares the codec with reference frames, the rows of `data/golden.csv`.
 
 use supple_damiao::{
-    Feedback, Frame, MitCodes, MitCommand, Ranges, Register, RegisterReply, Request, Special,
-    Status, Value, flash, modes,
+    Feedback, Frame, MitCodes, MitCommand, Ranges, Register, RegisterReply, Request,
+    SpecialCommand, Status, Value, flash, modes,
     register::{self, Operation},
 };
 
@@ -15,7 +15,7 @@ struct Row {
     rounded: String,
 }
 
-/// Fields of a line; a field with commas is in quotation marks, which are doubled inside.
+/// Splits a line into fields; a field with commas is in quotation marks, which are doubled inside the field.
 fn fields(line: &str) -> Vec<String> {
     let (mut fields, mut field, mut quoted) = (Vec::new(), String::new(), false);
     for c in line.chars() {
@@ -54,14 +54,14 @@ fn rows(kind: &str) -> Vec<Row> {
     rows.into_iter().filter(|row| row.kind == kind).collect()
 }
 
-/// The number after `key=` in a meaning.
+/// Returns the number after `key=` in the column `meaning`.
 fn number(meaning: &str, key: &str) -> f64 {
     let mut words = meaning.split([' ', ',']);
     let found = words.find_map(|word| word.strip_prefix(key)?.strip_prefix('='));
     found.expect(key).parse().expect("a number")
 }
 
-/// Ranges as the motors of these frames had them.
+/// Returns the ranges of the motor that a frame is from.
 fn ranges(meaning: &str) -> Ranges {
     let (velocity, torque) = match &meaning[..4] {
         "4310" => (30.0, 10.0),
@@ -77,7 +77,7 @@ fn text(frame: &Frame) -> String {
 }
 
 #[test]
-fn commands_are_the_rounded_golden_frames() {
+fn commands_equal_the_rounded_reference_frames() {
     let rows = rows("mit");
     assert_eq!(rows.len(), 17);
     for row in rows {
@@ -94,7 +94,7 @@ fn commands_are_the_rounded_golden_frames() {
         if command.kp_nm_per_rad < 500.0 {
             assert_eq!(text(&sent), row.rounded, "{}", row.meaning);
         } else {
-            // The greatest stiffness is one step lower, so that no command is a special frame.
+            // The maximum stiffness is one step lower, so that no command is a special frame.
             let found = MitCodes::parse(sent.eight().unwrap());
             let golden = MitCodes::parse(expected.eight().unwrap());
             assert_eq!(
@@ -110,7 +110,7 @@ fn commands_are_the_rounded_golden_frames() {
     }
 }
 
-/// The frames of encoders that round down: their values come back, and encode to the same codes.
+/// Frames of encoders that round down: their values decode and encode to the same codes.
 #[test]
 fn codes_of_other_encoders_survive_a_round_trip() {
     for row in rows("mit") {
@@ -131,15 +131,21 @@ fn codes_of_other_encoders_survive_a_round_trip() {
 }
 
 #[test]
-fn special_frames_are_the_golden_ones() {
+fn special_frames_equal_the_reference_frames() {
     let rows = rows("special");
     let expected = [
-        (Special::Enable.emit(2), Request::Special(Special::Enable)),
-        (Special::Disable.emit(2), Request::Special(Special::Disable)),
+        (
+            SpecialCommand::Enable.emit(2),
+            Request::SpecialCommand(SpecialCommand::Enable),
+        ),
+        (
+            SpecialCommand::Disable.emit(2),
+            Request::SpecialCommand(SpecialCommand::Disable),
+        ),
         (flash::set_zero(2), Request::SetZero),
         (
-            Special::ClearError.emit(2),
-            Request::Special(Special::ClearError),
+            SpecialCommand::ClearError.emit(2),
+            Request::SpecialCommand(SpecialCommand::ClearError),
         ),
     ];
     assert_eq!(rows.len(), expected.len());
@@ -152,7 +158,7 @@ fn special_frames_are_the_golden_ones() {
 }
 
 #[test]
-fn commands_of_other_modes_are_the_golden_ones() {
+fn commands_of_other_modes_equal_the_reference_frames() {
     assert_eq!(
         modes::pos_vel(5, 1.5, 2.0).unwrap(),
         rows("pos_vel")[0].frame
@@ -172,19 +178,19 @@ fn commands_of_other_modes_are_the_golden_ones() {
 }
 
 #[test]
-fn register_reads_are_the_golden_ones() {
+fn register_reads_equal_the_reference_frames() {
     let rows = rows("read");
     assert_eq!(rows.len(), 10);
     for row in rows {
         let name = row.meaning.strip_prefix("id 3 ").unwrap();
-        let info = Register::named(name).unwrap_or_else(|| panic!("{name}"));
+        let info = Register::by_name(name).unwrap_or_else(|| panic!("{name}"));
         assert_eq!(register::read(3, info.register), row.frame);
         assert_eq!(
             Request::parse(&row.frame, 3),
             Some(Request::Read(info.register))
         );
     }
-    assert_eq!(rows_frame("refresh"), register::ask_feedback(3));
+    assert_eq!(rows_frame("refresh"), register::request_feedback(3));
     assert_eq!(
         Request::parse(&rows_frame("refresh"), 3),
         Some(Request::Feedback)
@@ -196,7 +202,7 @@ fn rows_frame(kind: &str) -> Frame {
 }
 
 #[test]
-fn register_writes_are_the_golden_ones_or_refused() {
+fn register_writes_equal_the_reference_frames_or_are_refused() {
     let rows = rows("write");
     for (row, (name, value)) in rows.iter().zip([
         ("TIMEOUT", Value::Integer(400)),
@@ -204,7 +210,7 @@ fn register_writes_are_the_golden_ones_or_refused() {
         ("PMAX", Value::Float(12.5)),
         ("TMAX", Value::Float(28.0)),
     ]) {
-        let info = Register::named(name).unwrap();
+        let info = Register::by_name(name).unwrap();
         let expected = Request::Write(info.register, value.to_bytes());
         assert_eq!(
             Request::parse(&row.frame, 3),
@@ -230,7 +236,7 @@ fn register_writes_are_the_golden_ones_or_refused() {
 }
 
 #[test]
-fn register_replies_are_the_golden_ones() {
+fn register_replies_equal_the_reference_frames() {
     let rows = rows("reply");
     let expected = [
         ("MST_ID", Value::Integer(19), Operation::Read),
@@ -243,7 +249,7 @@ fn register_replies_are_the_golden_ones() {
     ];
     assert_eq!(rows.len(), expected.len());
     for (row, (name, value, operation)) in rows.iter().zip(expected) {
-        let register = Register::named(name).unwrap().register;
+        let register = Register::by_name(name).unwrap().register;
         let reply = RegisterReply::parse(&row.frame, 3, operation, register).expect("a reply");
         assert_eq!(reply.value(), value, "{}", row.meaning);
         assert_eq!(reply.emit(3, 0x13, operation), row.frame);
@@ -259,7 +265,7 @@ fn register_replies_are_the_golden_ones() {
 }
 
 #[test]
-fn feedback_is_the_golden_one() {
+fn feedback_equals_the_reference_frames() {
     let rows = rows("feedback");
     assert_eq!(rows.len(), 14);
     for row in rows {

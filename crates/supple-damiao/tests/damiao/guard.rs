@@ -1,11 +1,11 @@
-//! Every condition of a motor becomes its named fault, within two cycles, and stays.
+//! Tests that every faulty condition of a motor becomes the corresponding fault within two cycles, and that the fault stays.
 
 use supple_damiao::guard::{MotorFault, MotorGuard};
-use supple_damiao::temperature::{Heat, MIN_SHARE, Thermal};
+use supple_damiao::temperature::{MIN_SHARE, TemperatureLevel, TemperatureLimits};
 use supple_damiao::{Feedback, Ranges, Register, Status, Value};
 
-fn thermal() -> Thermal {
-    Thermal::new(70.0, 80.0, 95.0).unwrap()
+fn thermal() -> TemperatureLimits {
+    TemperatureLimits::new(70.0, 80.0, 95.0).unwrap()
 }
 
 fn guard() -> MotorGuard {
@@ -24,7 +24,7 @@ fn feedback() -> Feedback {
     }
 }
 
-/// Cycles until the fault, counted from the first cycle of the condition, and the fault.
+/// Returns the number of cycles until the fault, counted from the first cycle of the condition, and the fault.
 fn until_fault(
     guard: &mut MotorGuard,
     condition: Option<Feedback>,
@@ -63,7 +63,7 @@ fn every_error_code_is_a_fault_in_its_cycle() {
 fn a_silent_motor_is_a_fault_in_the_second_cycle() {
     let (cycles, fault) = until_fault(&mut guard(), None, 0);
     assert_eq!((cycles, fault), (2, MotorFault::Silent { cycles: 2 }));
-    // A single lost reply is bridged, and its age known.
+    // A single lost reply is tolerated, and the age of the feedback is known.
     let mut guard = guard();
     guard.cycle(Some(&feedback()), 1).unwrap();
     guard.cycle(None, 0).unwrap();
@@ -73,9 +73,9 @@ fn a_silent_motor_is_a_fault_in_the_second_cycle() {
     guard.cycle(None, 0).unwrap();
 }
 
-/// A gap of replies hides no later fault.
+/// Missing replies do not hide a later fault.
 #[test]
-fn an_error_after_a_silence_is_named() {
+fn an_error_after_silence_is_reported() {
     let mut guard = guard();
     for _ in 0..10 {
         let _ = guard.cycle(None, 0);
@@ -106,7 +106,7 @@ fn a_fault_stays() {
 
 #[test]
 fn a_jump_of_the_position_is_a_fault() {
-    // 10 rad/s for 1 ms are 26 steps; two more for rounding.
+    // 10 rad/s for 1 ms are 26 steps; rounding adds two.
     for (steps, jumps) in [(28, false), (29, true), (2000, true)] {
         let condition = Feedback {
             position: 0x8000 + steps,
@@ -139,7 +139,7 @@ fn two_motors_with_one_id_are_a_fault() {
 }
 
 #[test]
-fn heat_warns_then_derates_then_ends() {
+fn rising_temperature_causes_warning_then_derating_then_fault() {
     let mut guard = guard();
     let mut last_share = 1.0;
     for celsius in 0..95 {
@@ -150,9 +150,9 @@ fn heat_warns_then_derates_then_ends() {
         };
         guard.cycle(Some(&condition), 1).unwrap();
         let expected = match celsius {
-            0..70 => Heat::Normal,
-            70..80 => Heat::Warning,
-            _ => Heat::Derating,
+            0..70 => TemperatureLevel::Normal,
+            70..80 => TemperatureLevel::Warning,
+            _ => TemperatureLevel::Derating,
         };
         assert_eq!(guard.heat(), expected, "{celsius}");
         assert!(guard.torque_share() <= last_share && guard.torque_share() >= MIN_SHARE);
@@ -168,7 +168,7 @@ fn heat_warns_then_derates_then_ends() {
         Err(MotorFault::Hot { celsius: 95 })
     );
     assert_eq!(guard.torque_share(), MIN_SHARE);
-    assert!(Thermal::new(80.0, 80.0, 95.0).is_none());
+    assert!(TemperatureLimits::new(80.0, 80.0, 95.0).is_none());
 }
 
 #[test]

@@ -1,6 +1,7 @@
-//! What a start-up accepts and refuses; each refusal names register, found, expected and remedy.
+//! Tests of the motors that start-up accepts and refuses. Each refusal contains register, found value, expected value and
+//! remedy.
 
-use supple_damiao::inspection::{Expectation, Readings, TO_READ};
+use supple_damiao::inspection::{Expectation, RegisterReadings, TO_READ};
 use supple_damiao::{Problem, Register, Value};
 
 fn expectation() -> Expectation<'static> {
@@ -35,19 +36,19 @@ const GOOD: [(Register, Value); 14] = [
     (Register::SHAFT_POSITION, Value::Float(0.25)),
 ];
 
-fn readings(change: Option<(Register, Value)>) -> Readings {
-    let mut readings = Readings::new();
+fn readings(change: Option<(Register, Value)>) -> RegisterReadings {
+    let mut readings = RegisterReadings::new();
     for (register, value) in GOOD {
-        readings.note(register, value.to_bytes());
+        readings.insert(register, value.to_bytes());
     }
     if let Some((register, value)) = change {
-        readings.note(register, value.to_bytes());
+        readings.insert(register, value.to_bytes());
     }
     readings
 }
 
 #[test]
-fn a_motor_that_fits_is_accepted() {
+fn a_matching_motor_is_accepted() {
     let found = expectation().check(&readings(None), Some(0.251)).unwrap();
     assert_eq!(found.ranges.torque().max(), 28.0);
     assert_eq!((found.write_mode, found.write_timeout), (false, None));
@@ -55,7 +56,7 @@ fn a_motor_that_fits_is_accepted() {
 }
 
 #[test]
-fn mode_and_watchdog_are_written_at_the_start() {
+fn mode_and_watchdog_are_written_at_start_up() {
     let changed = readings(Some((Register::MODE, Value::Integer(2))));
     assert!(expectation().check(&changed, None).unwrap().write_mode);
     let changed = readings(Some((Register::TIMEOUT, Value::Integer(0))));
@@ -64,7 +65,7 @@ fn mode_and_watchdog_are_written_at_the_start() {
 }
 
 #[test]
-fn every_register_that_is_not_read_is_named() {
+fn a_missing_reading_of_any_register_is_refused_with_its_name() {
     for register in TO_READ {
         let optional = [
             Register::TORQUE_CONSTANT,
@@ -72,20 +73,23 @@ fn every_register_that_is_not_read_is_named() {
             Register::FLUX,
             Register::SERIAL,
         ];
-        let mut readings = Readings::new();
+        let mut readings = RegisterReadings::new();
         for (known, value) in GOOD.iter().filter(|(known, _)| *known != register) {
-            readings.note(*known, value.to_bytes());
+            readings.insert(*known, value.to_bytes());
         }
         let found = expectation().check(&readings, None);
         match optional.contains(&register) {
             true => assert!(found.is_ok(), "{register}"),
-            false => assert_eq!(found.unwrap_err().problem, Problem::NotRead(register)),
+            false => assert_eq!(
+                found.unwrap_err().problem,
+                Problem::RegisterNotRead(register)
+            ),
         }
     }
 }
 
 #[test]
-fn a_refusal_names_register_found_expected_and_remedy() {
+fn a_refusal_contains_register_found_and_expected_value_and_remedy() {
     for (change, words) in [
         (
             (Register::ID, Value::Integer(4)),

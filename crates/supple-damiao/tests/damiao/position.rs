@@ -1,4 +1,4 @@
-//! Whole turns at the start.
+//! Tests of unwrapping whole turns at start-up.
 
 use core::f64::consts::TAU;
 use supple_damiao::position::{JointAngle, PositionError};
@@ -17,7 +17,7 @@ fn every_angle_is_found_from_any_turn() {
                 let motor_rad = direction * (angle_rad - 0.3) + f64::from(turns) * TAU;
                 let found = map.unwrapped(motor_rad, LOWER, UPPER, 0.02).unwrap();
                 assert!((found.joint_rad(motor_rad) - angle_rad).abs() < 1e-12);
-                // The next position is one step on, not a turn.
+                // The next position differs by one step, not by a turn.
                 assert!(
                     (found.joint_rad(motor_rad + direction * 1e-3) - angle_rad - 1e-3).abs()
                         < 1e-12

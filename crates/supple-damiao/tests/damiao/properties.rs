@@ -1,4 +1,4 @@
-//! Properties of the codec over all values.
+//! Property-based tests of the codec.
 
 use proptest::prelude::*;
 use supple_damiao::{Feedback, Frame, MitCodes, MitCommand, Ranges, Request, Status, TorqueShaper};
@@ -25,7 +25,7 @@ fn codes() -> impl Strategy<Value = MitCodes> {
         })
 }
 
-/// Any command, far outside of its ranges too.
+/// Generates any command, including values far outside the ranges.
 fn command() -> impl Strategy<Value = MitCommand> {
     let any = || {
         prop_oneof![
@@ -73,7 +73,7 @@ proptest! {
         }
     }
 
-    /// The sum of what was sent stays within half a step of the sum of what was wanted.
+    /// The sum of the sent torques stays within half a step of the sum of the requested torques.
     #[test]
     fn the_mean_torque_is_exact(torques in prop::collection::vec(-9.0..9.0f64, 1..400)) {
         let ranges = Ranges::new(12.5, 30.0, 10.0).unwrap();
@@ -94,7 +94,7 @@ proptest! {
         prop_assert_eq!(feedback.status, Status::from_code(bytes[0] >> 4));
     }
 
-    /// What is for one motor is for no other, unless it has the same low byte.
+    /// A frame is for one motor only, unless another id has the same low byte.
     #[test]
     fn a_frame_is_for_one_motor(raw in 0..0x800u32, payload in prop::collection::vec(any::<u8>(), 0..9)) {
         let frame = Frame::new(raw, &payload).unwrap();
@@ -103,7 +103,7 @@ proptest! {
     }
 }
 
-/// All torque codes at the greatest position, velocity, kp and kd: the frames that public encoders turn into "clear
+/// Encodes all torque codes at the maximum position, velocity, kp and kd, for which public encoders produce the frames "clear
 /// error", "enable", "disable" and "set zero".
 #[test]
 fn no_saturated_torque_is_a_special_frame() {
@@ -126,7 +126,7 @@ fn no_saturated_torque_is_a_special_frame() {
 }
 
 #[test]
-fn what_is_no_number_is_refused() {
+fn values_that_are_not_finite_are_refused() {
     let ranges = Ranges::new(12.5, 30.0, 10.0).unwrap();
     let mut shaper = TorqueShaper::new();
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
@@ -162,7 +162,7 @@ fn what_is_no_number_is_refused() {
     assert!(Ranges::new(12.5, 30.0, -10.0).is_err());
 }
 
-/// Zero has no code: half of the cycles send the code above it, half the one below.
+/// Zero has no code: half of the cycles send the code above zero, half the code below.
 #[test]
 fn zero_torque_alternates_between_its_neighbours() {
     let ranges = Ranges::new(12.5, 45.0, 54.0).unwrap();
@@ -174,9 +174,9 @@ fn zero_torque_alternates_between_its_neighbours() {
     assert_eq!(codes.iter().filter(|code| **code == 0x800).count(), 500);
 }
 
-/// Saturation carries nothing: afterwards the torque is what is wanted at once.
+/// A saturated torque carries no error: the next torque is sent exactly.
 #[test]
-fn a_saturated_torque_carries_nothing() {
+fn a_saturated_torque_carries_no_error() {
     let ranges = Ranges::new(12.5, 30.0, 10.0).unwrap();
     let mut shaper = TorqueShaper::new();
     for _ in 0..100 {

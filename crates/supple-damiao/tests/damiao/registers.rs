@@ -1,4 +1,4 @@
-//! The register table and what may be written.
+//! Tests of the register table and of the allowed writes.
 
 use supple_damiao::firmware::{Firmware, FirmwareError};
 use supple_damiao::register::{Access, Kind, REGISTERS, WriteError, write};
@@ -11,11 +11,11 @@ fn every_register_has_its_own_number_and_name() {
     }
     for info in REGISTERS {
         assert_eq!(info.register.info(), Some(info));
-        assert_eq!(Register::named(&info.name.to_lowercase()), Some(info));
+        assert_eq!(Register::by_name(&info.name.to_lowercase()), Some(info));
     }
 }
 
-/// No write that this crate encodes can change what host and motor must agree on, or write flash.
+/// No write that this crate encodes can change a value that must be equal in host and motor, or write flash.
 #[test]
 fn writes_are_harmless() {
     for number in 0..=255 {
@@ -24,7 +24,7 @@ fn writes_are_harmless() {
             let Ok(frame) = write(5, register, value) else {
                 continue;
             };
-            let info = register.info().expect("a known register");
+            let info = register.info().expect("the register is known");
             assert_eq!((info.access, info.kind), (Access::Writable, value.kind()));
             let request = Request::parse(&frame, 5).expect("a request");
             assert!(!request.writes_flash());
@@ -48,7 +48,7 @@ fn writes_are_harmless() {
 }
 
 #[test]
-fn firmware_for_an_arm() {
+fn unsupported_firmware_is_refused() {
     let check = |text: &[u8; 4], fd| Firmware::parse(*text).unwrap().check(fd);
     assert_eq!(check(b"5017", true), Ok(()));
     assert_eq!(check(b"6417", true), Ok(()));

@@ -1,4 +1,4 @@
-//! Torque with several simultaneous losses: a loss that invalidates the fallback torque ends it.
+//! Tests of the safe action after one loss, and after several simultaneous losses.
 
 use supple_drive::{Drives, GuardInput, LossReason, MotorFault, SafeActionMachine, Stage, Torque};
 
@@ -15,7 +15,7 @@ fn without_loss(ms: u64) -> GuardInput {
         bus_off: false,
         drives: Drives::Active,
         drive_loss: None,
-        leaving: false,
+        shutting_down: false,
     }
 }
 
@@ -33,7 +33,7 @@ fn overspeed_ends_the_fallback_torque_during_any_other_loss() {
     type Change = fn(&mut GuardInput);
     let losses: [(&str, Change); 4] = [
         ("no answer", |input| input.answer = None),
-        ("leaving", |input| input.leaving = true),
+        ("shutting_down", |input| input.shutting_down = true),
         ("unsent", |input| input.unsent = true),
         ("bus off", |input| input.bus_off = true),
     ];
@@ -60,34 +60,34 @@ fn overspeed_ends_the_fallback_torque_during_any_other_loss() {
 }
 
 #[test]
-fn activation_outside_gravity_hold_is_set_to_idle_with_the_fallback_torque() {
+fn drives_activated_outside_gravity_hold_are_set_to_idle_with_the_fallback_torque() {
     let mut guard = SafeActionMachine::new();
     let mut input = without_loss(0);
-    input.drive_guard_loss = Some(LossReason::Activated);
+    input.drive_guard_loss = Some(LossReason::ActivatedOutsideGravityHold);
     let action = guard.cycle(&input, false);
     assert_eq!(action.torque, Torque::Fallback);
     assert!(action.lower);
 }
 
-/// Every loss, by the table: what a braking and a falling arm do in the cycle after it, and at the end.
+/// For every loss, checks the safe action of an arm that brakes and of an arm that falls, from the next cycle to the end.
 #[test]
 fn an_arm_that_falls_is_held_and_laid_down_before_its_motors_are_disabled() {
     type Change = fn(&mut GuardInput);
     let losses: [(LossReason, Change); 8] = [
-        (LossReason::Answer, |input| input.answer = None),
+        (LossReason::NoAnswer, |input| input.answer = None),
         (LossReason::TorqueNotWanted, |input| {
             input.answer = Some(false);
         }),
         (LossReason::Overspeed(2), |input| {
             input.drive_guard_loss = Some(LossReason::Overspeed(2));
         }),
-        (LossReason::Encoder(0), |input| input.missing = 1),
+        (LossReason::EncoderLost(0), |input| input.missing = 1),
         (LossReason::Motor(3, MotorFault::HotWinding), |input| {
             input.drive_loss = Some(LossReason::Motor(3, MotorFault::HotWinding));
         }),
-        (LossReason::Transmit, |input| input.unsent = true),
+        (LossReason::NotTransmitted, |input| input.unsent = true),
         (LossReason::BusOff, |input| input.bus_off = true),
-        (LossReason::Leaving, |input| input.leaving = true),
+        (LossReason::ShuttingDown, |input| input.shutting_down = true),
     ];
     for (reason, lose) in losses {
         let mut guard = SafeActionMachine::falling(100 * MS);
@@ -97,7 +97,7 @@ fn an_arm_that_falls_is_held_and_laid_down_before_its_motors_are_disabled() {
         for ms in 1..500 {
             let mut input = without_loss(ms);
             lose(&mut input);
-            // The arm lies 200 ms later, and a disabled motor is idle.
+            // The arm lies after 200 ms; a disabled motor is idle.
             if matches!(guard.stage(), Stage::Lowering(..)) {
                 input.drives = Drives::Idle;
             }
@@ -129,13 +129,13 @@ fn an_arm_that_falls_is_held_and_laid_down_before_its_motors_are_disabled() {
     }
 }
 
-/// A held arm that its own torque drives: damped without torque until it rests, then disabled. With a motor that has no
-/// torque the others go on holding.
+/// If the holding torque accelerates the arm, the motors damp without torque until the arm stands still, then are disabled.
+/// If one motor has no torque, the others continue to hold.
 #[test]
-fn a_hold_that_drives_the_arm_ends_in_damping() {
-    let driven = Some(LossReason::HoldDrives(1));
+fn overspeed_while_the_arm_is_held_leads_to_damping() {
+    let driven = Some(LossReason::OverspeedInHold(1));
     for stowing in [false, true] {
-        for motor_ended in [false, true] {
+        for motor_without_torque in [false, true] {
             let mut guard = SafeActionMachine::falling(100 * MS);
             guard.cycle(&without_loss(0), false);
             let begun = if stowing { 150 } else { 50 };
@@ -144,7 +144,8 @@ fn a_hold_that_drives_the_arm_ends_in_damping() {
                 input = GuardInput {
                     now_ns: ms * MS,
                     answer: Some(false),
-                    drive_loss: motor_ended.then_some(LossReason::Motor(3, MotorFault::Overload)),
+                    drive_loss: motor_without_torque
+                        .then_some(LossReason::Motor(3, MotorFault::Overload)),
                     ..without_loss(ms)
                 };
                 guard.cycle(&input, false);
@@ -154,19 +155,19 @@ fn a_hold_that_drives_the_arm_ends_in_damping() {
             input.now_ns += MS;
             input.hold_loss = driven;
             let action = guard.cycle(&input, false);
-            if motor_ended {
+            if motor_without_torque {
                 assert_eq!(guard.stage(), before);
                 continue;
             }
             assert_eq!((action.torque, action.lower), (Torque::Damp, false));
-            // What drove the arm is over; the torque does not come back.
+            // The overspeed has ended; the holding torque does not return.
             input.now_ns += MS;
             input.hold_loss = None;
             assert_eq!(guard.cycle(&input, false).torque, Torque::Damp);
             assert!(guard.cycle(&input, true).lower);
             assert!(matches!(
                 guard.stage(),
-                Stage::Lowering(LossReason::HoldDrives(1), _)
+                Stage::Lowering(LossReason::OverspeedInHold(1), _)
             ));
         }
     }
@@ -181,7 +182,7 @@ fn damping_ends_after_ten_seconds() {
     for ms in 1..20_000 {
         let input = GuardInput {
             answer: Some(false),
-            hold_loss: Some(LossReason::HoldDrives(0)),
+            hold_loss: Some(LossReason::OverspeedInHold(0)),
             ..without_loss(ms)
         };
         if guard.cycle(&input, false).lower && ended_ms.is_none() {

@@ -1,4 +1,4 @@
-//! The plant loop: its guard, and its link to the controller.
+//! Tests of the plant loop: safe action, laying down, and link to the controller.
 
 mod guard;
 mod shared_memory;

@@ -1,4 +1,4 @@
-//! Link to the controller: commands for another arm are discarded without an error.
+//! Tests of the link to the controller: it discards commands for another arm without an error.
 
 use core::time::Duration;
 use supple_core::{Controller, State, step};

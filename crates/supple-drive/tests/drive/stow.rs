@@ -1,4 +1,4 @@
-//! Laying down: what its spring may do.
+//! Tests of laying down: limit of the spring torque.
 
 use supple_core::Vector;
 use supple_core::dynamics::gravity;
@@ -22,14 +22,14 @@ fn stowing(stow_rad: Vector<4>) -> (Stowing<4>, Vector<4>) {
     (stowing, gravity(&config.arm, &pose_rad))
 }
 
-/// The reference goes on while something blocks the arm: the spring pulls with 0.2 rad at most.
+/// The reference continues while the arm is blocked: the spring torque is limited to that of 0.2 rad.
 #[test]
-fn a_blocked_arm_is_not_pushed_harder_and_harder() {
+fn the_spring_torque_on_a_blocked_arm_is_limited() {
     let (mut stowing, gravity_nm) = stowing(Vector::zeros());
     let mut max = 0.0_f64;
     for ms in 0..5000 {
         let torque_nm = stowing.stow_nm(f64::from(ms) * 1e-3);
-        // Within the time of the reference: afterwards the torque fades.
+        // The checks end with the reference: afterwards the torque fades.
         if f64::from(ms) * 1e-3 < 1.875 * 1.2 / 0.4 {
             max = max.max((torque_nm - gravity_nm).amax());
         }

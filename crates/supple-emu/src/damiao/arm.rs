@@ -1,4 +1,4 @@
-//! The arm on its bus: motors, plant and medium, in virtual time.
+//! Emulated arm with Damiao motors: motors, plant and bus medium, in virtual time.
 
 use super::config::DamiaoConfig;
 use super::misbehaviour::{Misbehaviour, MisbehaviourKind};
@@ -16,18 +16,18 @@ use supple_plant::{
 };
 use supple_random::Random;
 
-/// What happened to a motor.
+/// Event of a motor or of its bus.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MotorEvent {
-    /// A motor, counted from 0, entered this state.
+    /// The motor of this index, counted from 0, entered this status.
     Status(usize, Status),
-    /// A motor was asked to write flash, and obeyed.
+    /// A motor executed a request that writes flash.
     Flash(usize, Request),
     /// A misbehaviour began.
     Misbehaves(Misbehaviour),
 }
 
-/// An arm of Damiao motors. All joints are driven directly.
+/// Emulated arm with Damiao motors. Each motor moves one joint directly.
 pub struct DamiaoArm<const N: usize> {
     config: DamiaoConfig,
     now_ns: u64,
@@ -36,7 +36,7 @@ pub struct DamiaoArm<const N: usize> {
     plant: Plant<N>,
     injector: Injector<N>,
     motors: Vec<Motor>,
-    /// Those that have not begun.
+    /// Misbehaviours that have not begun.
     misbehaviours: Vec<Misbehaviour>,
     /// Time at which the first motor was enabled \[ns\].
     enabled_ns: Option<u64>,
@@ -51,8 +51,8 @@ pub struct DamiaoArm<const N: usize> {
 }
 
 impl<const N: usize> DamiaoArm<N> {
-    /// An arm at rest at `start_rad`, at time `start_ns`. A joint whose `stow_rad` lies in its soft zone, `soft_zone_rad`
-    /// wide, rests there on its mechanical stop.
+    /// Creates an arm at standstill at `start_rad`, at time `start_ns`. A joint whose `stow_rad` lies within `soft_zone_rad` of a
+    /// limit gets its mechanical stop at that angle, so that the stowed arm rests on it.
     ///
     /// # Errors
     /// If the numbers of motors and joints differ, the motors do not drive the joints directly, or the plant rejects its
@@ -77,7 +77,7 @@ impl<const N: usize> DamiaoArm<N> {
             rest_on_stops(stops, &stow_rad, zone_rad);
         }
         let step_s = config.step_ns as f64 * 1e-9;
-        // The bus itself takes the first cycle.
+        // The bus already delays torques by one cycle.
         let late_s = plant.actuators.torque_delay_cycles.saturating_sub(1) as f64 * plant.cycle_s;
         plant.actuators = ActuatorModel {
             counts_per_motor_revolution: Vector::zeros(),
@@ -107,14 +107,14 @@ impl<const N: usize> DamiaoArm<N> {
             offset_ns: 0,
             config,
         };
-        arm.move_motors();
+        arm.update_motors();
         Ok(arm)
     }
 
-    /// Adds misbehaviours; those without a time begin now. Call it before advancing time.
+    /// Adds misbehaviours; a misbehaviour without a time begins now. Call it before advancing time.
     ///
     /// # Errors
-    /// A motor that the arm does not have.
+    /// If the arm does not have the motor.
     pub fn misbehave(&mut self, misbehaviours: &[Misbehaviour]) -> Result<(), EmulatorError> {
         for misbehaviour in misbehaviours {
             let other = match misbehaviour.kind {
@@ -150,7 +150,7 @@ impl<const N: usize> DamiaoArm<N> {
             injection.check_bus_support()?;
         }
         self.injector = Injector::new(injections, &mut self.plant, period_s)?;
-        self.move_motors();
+        self.update_motors();
         Ok(())
     }
 
@@ -195,7 +195,7 @@ impl<const N: usize> DamiaoArm<N> {
         self.wire.busy_ns()
     }
 
-    /// Takes away the support, if there is one.
+    /// Removes the support, if there is one.
     pub fn release(&mut self) {
         self.supported = false;
     }
@@ -216,7 +216,7 @@ impl<const N: usize> DamiaoArm<N> {
         wire.min(self.next_tick_ns)
     }
 
-    /// Pauses the arm for `gap_ns`, without motion; frames that wait for the bus are lost.
+    /// Advances the clock by `gap_ns` without motion; frames that wait for the bus are lost.
     pub fn shift_clock(&mut self, gap_ns: u64) {
         self.wire.pause(gap_ns);
         self.next_tick_ns += gap_ns;
@@ -248,8 +248,8 @@ impl<const N: usize> DamiaoArm<N> {
         }
     }
 
-    /// Passes the joints' motion to the motors.
-    fn move_motors(&mut self) {
+    /// Updates the motors from the motion of the joints.
+    fn update_motors(&mut self) {
         let position_rad = *self.injector.position_rad();
         let velocity = self.plant.truth().motor_velocity_rad_per_s;
         let step_s = self.config.step_ns as f64 * 1e-9;
@@ -268,7 +268,7 @@ impl<const N: usize> DamiaoArm<N> {
             self.injector
                 .cycle(&mut self.plant, view, &torque_nm, shorted);
         }
-        self.move_motors();
+        self.update_motors();
         if let Some(enabled_ns) = self.enabled_ns {
             let elapsed_s = (self.now_ns - enabled_ns) as f64 * 1e-9;
             let (due, later): (Vec<_>, Vec<_>) = self
@@ -289,7 +289,7 @@ impl<const N: usize> DamiaoArm<N> {
         self.next_tick_ns += self.config.step_ns;
     }
 
-    /// Records the motors whose state differs from `before`; with all of them enabled the arm carries itself.
+    /// Records the motors whose status differs from `before`; once all motors are enabled, removes the support.
     fn record_states(&mut self, before: &[Status]) {
         for (motor, before) in before.iter().enumerate() {
             let status = self.motors[motor].status();
@@ -307,7 +307,7 @@ impl<const N: usize> DamiaoArm<N> {
         }
     }
 
-    /// A frame is complete: all nodes have it. Returns the event for the host.
+    /// Delivers a complete frame to all nodes; returns the event for the host.
     fn deliver(&mut self, frame: CanFrame, from_host: bool) -> Event {
         if !from_host {
             return Event::Frame(frame);
@@ -319,7 +319,7 @@ impl<const N: usize> DamiaoArm<N> {
             if let Some(request) = reaction.flash {
                 assert!(
                     self.config.allow_flash,
-                    "the host asks motor {} to write its flash: {request:?} by {frame:?}",
+                    "the host requests motor {} to write its flash: {request:?} in {frame:?}",
                     index + 1
                 );
                 self.record(MotorEvent::Flash(index, request));
@@ -335,14 +335,14 @@ impl<const N: usize> DamiaoArm<N> {
         Event::Sent(frame)
     }
 
-    /// Whether a frame on the wire is one of the host: no motor replies with the id of a command.
+    /// Whether the host sent a frame: no motor replies with the id of a command.
     fn is_from_host(&self, frame: &CanFrame) -> bool {
         let id = frame.id().raw();
         !self.motors.iter().any(|motor| motor.ids()[1] == id)
     }
 }
 
-/// Puts the mechanical stop of a joint where the arm rests on it.
+/// Moves the mechanical stops of the joints so that the stowed arm rests on them.
 fn rest_on_stops<const N: usize>(stops: &mut HardStops<N>, stow_rad: &Vector<N>, zone_rad: f64) {
     for i in 0..N {
         let rests = |stop_rad: f64| (stow_rad[i] - stop_rad).abs() <= zone_rad * (1.0 + 1e-9);
@@ -374,7 +374,7 @@ impl<const N: usize> EmulatedNodes for DamiaoArm<N> {
             let end_ns = self.wire.next_end_ns().unwrap_or(u64::MAX);
             let next_ns = end_ns.min(self.next_tick_ns);
             if next_ns > until_ns {
-                // A frame that is ready by now starts before the host sends its next one.
+                // A frame that is ready by now starts before the next frame of the host.
                 self.wire.advance(until_ns);
                 self.now_ns = until_ns;
                 return None;

@@ -6,9 +6,9 @@ use supple_model::{BusDescription, BusFormat, BusMotor};
 /// Registers, mechanical data and initial state of one motor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotorConfig {
-    /// Id that it listens to.
+    /// Id of the frames to the motor.
     pub id: u8,
-    /// Id of its replies.
+    /// Id of the motor's replies.
     pub reply_id: u16,
     /// Firmware, four digits.
     pub firmware: [u8; 4],
@@ -22,29 +22,29 @@ pub struct MotorConfig {
     pub velocity_range_rad_per_s: f64,
     /// TMAX \[N m\].
     pub torque_range_nm: f64,
-    /// Torque at the greatest current \[N m\]; 0.7 TMAX by default, about the peak torque of the data sheets.
+    /// Torque at the maximum current \[N m\]; 0.7 TMAX by default, about the peak torque of the data sheets.
     pub peak_torque_nm: f64,
     /// Pole pairs.
     pub pole_pairs: u32,
     /// Flux \[Wb\], as the motor identified it.
     pub flux_wb: f64,
-    /// 1 if it turns as the joint, else -1.
+    /// 1 if motor and joint turn in the same direction, otherwise -1.
     pub direction: f64,
-    /// Angle of the joint where its position is zero \[rad\].
+    /// Angle of the joint at the zero position of the motor \[rad\].
     pub zero_offset_rad: f64,
-    /// TIMEOUT in flash, in units of 50 us; 0, the factory's default: no watchdog until a host sets it.
+    /// TIMEOUT in flash, in units of 50 us; 0 (the factory default) means no watchdog until a host sets it.
     pub timeout: u32,
-    /// Whether it answers in FD frames (register can_br).
+    /// Whether the motor answers with FD frames (register can_br).
     pub fd: bool,
-    /// Whether a disabled motor brakes through shorted phases. False by default: what they do is not published, and arms
-    /// of this type are reported to fall.
+    /// Whether a disabled motor brakes through shorted phases. False by default: the maker does not
+    /// publish this, and arms of this type are reported to fall.
     pub brakes_when_disabled: bool,
     /// Temperature at the start \[degrees Celsius\]; 30 by default.
     pub celsius: f64,
 }
 
 impl MotorConfig {
-    /// A motor that passes the comparison of the start-up with `[bus]`; what the file does not give is assumed.
+    /// Returns a motor that passes the checks of start-up against `[bus]`; values that the TOML does not give are assumed.
     pub fn expected(motor: &BusMotor, fd: bool) -> MotorConfig {
         let series = motor.firmware_series.as_deref();
         let series = series.unwrap_or(match &motor.model {
@@ -92,8 +92,8 @@ pub struct DamiaoConfig {
     /// Whether a support holds the arm in its start pose until all motors are enabled; true by default. Without it the
     /// arm falls at once.
     pub supported: bool,
-    /// Time between a frame's end and a motor's reply to it \[ns\]; 20 us by default, an assumption: the maker
-    /// publishes none.
+    /// Time between a frame's end and a motor's reply to it \[ns\]; 20 us by default, an assumption, because the
+    /// maker does not publish it.
     pub latency_ns: u64,
     /// Maximum random addition to the latency \[ns\]; 10 us by default, an assumption.
     pub jitter_ns: u64,
@@ -108,7 +108,7 @@ pub struct DamiaoConfig {
 }
 
 impl DamiaoConfig {
-    /// The motors that an arm's file expects, on its bus.
+    /// Returns the motors that an arm's TOML expects, on its bus.
     pub fn expected(bus: &BusDescription) -> DamiaoConfig {
         let fd = bus.format == BusFormat::Fd;
         let motors = bus.motors.iter();

@@ -1,107 +1,107 @@
-//! What a motor or the bus does wrong, on request.
+//! Faults of motors and bus that the emulator injects on request.
 
 use core::fmt;
 use core::str::FromStr;
 use supple_damiao::{Register, Status, Value};
 
-/// Syntax, for help texts.
+/// Syntax of a specification, for help texts.
 pub const HELP: &str = "\
-KIND or KIND:key=value,...; motor=K counts from 1, at-s=T is the time after the first motor was enabled; without it the
-arm has the fault from the start.
+KIND or KIND:key=value,...; motor=K counts from 1, at-s=T is the time after the first motor was enabled; without at-s,
+the fault exists from the start.
 
-  error:code=C         error code C: 8, 9, A to E, others unknown
-  silent               no reply, no reaction; its last torque stays until the watchdog ends it
-  reappears            its supply fails for a moment: disabled, registers as in flash
-  register:number=N,value=V   a register has another value, as of another type or set-up
-  hot:celsius=T        temperature
-  zero:offset-rad=X    its zero is elsewhere; 6.2832 is a whole turn
-  swapped:with=J       ids exchanged with motor J
-  same-id:with=J       the ids of motor J
+  error:code=C         the motor reports error code C: 8, 9, A to E; other codes are unknown errors
+  silent               the motor neither replies nor reacts; its watchdog ends its last torque
+  reappears            the motor's supply fails briefly: it is disabled, with the registers of its flash
+  register:number=N,value=V   a register has another value, as in a motor of another type or with other settings
+  hot:celsius=T        the motor has this temperature
+  zero:offset-rad=X    the motor's zero position is shifted; 6.2832 is a whole turn
+  swapped:with=J       the motor has exchanged its ids with motor J
+  same-id:with=J       the motor has the ids of motor J
   first-write-ignored  the first write of a register has no effect
   no-watchdog          TIMEOUT keeps its value
-  torque-sign          the torque that it is sent acts the wrong way, as of a wrong sign in the set-up; its damping is right
+  torque-sign          the commanded torque acts in the wrong direction, as with a wrong sign in the TOML; the damping is right
   reply-lost:every=N   one of N replies is missing
-  late:delay-us=D      replies come later
-  enabled              already enabled at the start
-  classic              answers FD frames with classic ones
-  bus-off              the host's CAN controller leaves the bus for a while (no motor=)
+  late:delay-us=D      replies are delayed
+  enabled              the motor is already enabled at the start
+  classic              the motor answers FD frames with classic frames
+  bus-off              the host's CAN controller is bus-off until it restarts (no motor=)
   wedged               the adapter accepts frames and sends none (no motor=)";
 
-/// A misbehaviour.
+/// A fault of a motor or of the bus, with its time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Misbehaviour {
     /// Motor, counted from 0; `None` for the bus.
     pub motor: Option<usize>,
     /// Time after the first motor was enabled \[s\]; `None` from the start.
     pub at_s: Option<f64>,
-    /// What.
+    /// Kind of fault.
     pub kind: MisbehaviourKind,
 }
 
-/// What a motor or the bus does wrong.
+/// Kind of fault of a motor or of the bus.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MisbehaviourKind {
-    /// An error: no torque.
+    /// The motor reports an error and applies no torque.
     Error {
         /// The error.
         status: Status,
     },
-    /// No replies, no reaction.
+    /// The motor neither replies nor reacts.
     Silent,
-    /// Disabled, with the registers of its flash.
+    /// The motor loses its supply briefly: it is disabled, with the registers of its flash.
     Reappears,
-    /// Another value in a register.
+    /// A register has another value.
     Register {
         /// Register.
         register: Register,
-        /// Its bytes.
+        /// Bytes of the register.
         bytes: [u8; 4],
     },
-    /// A temperature \[degrees Celsius\].
+    /// The motor has this temperature.
     Hot {
-        /// Temperature.
+        /// Temperature \[degrees Celsius\].
         celsius: f64,
     },
-    /// The zero is elsewhere \[rad\].
+    /// The zero position is shifted.
     Zero {
-        /// Added to its position.
+        /// Offset that is added to the position \[rad\].
         offset_rad: f64,
     },
-    /// Ids exchanged with another motor, or taken from it.
+    /// The motor has exchanged its ids with another motor, or has the same ids.
     SwappedWith {
-        /// The other, counted from 0.
+        /// The other motor, counted from 0.
         other: usize,
-        /// Whether the other one keeps its ids: two motors then have the same.
+        /// Whether the other motor keeps its ids, so that two motors have the same ids.
         same: bool,
     },
     /// The first register write has no effect.
     FirstWriteIgnored,
-    /// TIMEOUT cannot be set.
+    /// The register TIMEOUT cannot be set.
     NoWatchdog,
-    /// The torque that it is sent acts the wrong way.
+    /// The commanded torque acts in the wrong direction.
     TorqueSign,
-    /// One of so many replies is missing.
+    /// One of every `every` replies is missing.
     ReplyLost {
-        /// Period.
+        /// Number of replies of which one is missing.
         every: u32,
     },
-    /// Replies are late \[ns\].
+    /// Replies are delayed.
     Late {
-        /// Delay.
+        /// Delay \[ns\].
         delay_ns: u64,
     },
-    /// Enabled before the host enables it.
+    /// The motor is enabled before the host enables it.
     Enabled,
-    /// Answers with classic frames.
+    /// The motor answers with classic frames.
     Classic,
-    /// The host's controller is bus-off for a while.
+    /// The host's CAN controller is bus-off until it restarts.
     BusOff,
-    /// Frames of the host are accepted and not sent.
+    /// The host's adapter accepts frames but does not send them.
     Wedged,
 }
 
 impl fmt::Display for Misbehaviour {
-    /// What begins, without its time.
+    /// Writes the fault without its time.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(motor) = self.motor {
             write!(f, "motor {} ", motor + 1)?;
@@ -109,13 +109,13 @@ impl fmt::Display for Misbehaviour {
         match self.kind {
             MisbehaviourKind::Error { status } => write!(f, "has an error: {status}"),
             MisbehaviourKind::Silent => f.write_str("is silent"),
-            MisbehaviourKind::Reappears => f.write_str("loses its supply for a moment"),
+            MisbehaviourKind::Reappears => f.write_str("loses its supply briefly"),
             MisbehaviourKind::Register { register, .. } => {
                 write!(f, "has another value in {register}")
             }
             MisbehaviourKind::Hot { celsius } => write!(f, "is at {celsius} degrees Celsius"),
             MisbehaviourKind::Zero { offset_rad } => {
-                write!(f, "has its zero {offset_rad} rad elsewhere")
+                write!(f, "has its zero position shifted by {offset_rad} rad")
             }
             MisbehaviourKind::SwappedWith { other, same: false } => {
                 write!(f, "has exchanged its ids with motor {}", other + 1)
@@ -125,20 +125,22 @@ impl fmt::Display for Misbehaviour {
             }
             MisbehaviourKind::FirstWriteIgnored => f.write_str("ignores the next write"),
             MisbehaviourKind::NoWatchdog => f.write_str("keeps its watchdog setting"),
-            MisbehaviourKind::TorqueSign => f.write_str("turns its torque the wrong way"),
+            MisbehaviourKind::TorqueSign => {
+                f.write_str("applies its torque in the wrong direction")
+            }
             MisbehaviourKind::ReplyLost { every } => write!(f, "loses one of {every} replies"),
             MisbehaviourKind::Late { delay_ns } => {
                 write!(f, "replies {} us later", delay_ns / 1000)
             }
             MisbehaviourKind::Enabled => f.write_str("is enabled"),
             MisbehaviourKind::Classic => f.write_str("answers with classic frames"),
-            MisbehaviourKind::BusOff => f.write_str("the host's controller is bus-off"),
-            MisbehaviourKind::Wedged => f.write_str("the adapter sends nothing any more"),
+            MisbehaviourKind::BusOff => f.write_str("the host's CAN controller is bus-off"),
+            MisbehaviourKind::Wedged => f.write_str("the host's adapter does not send its frames"),
         }
     }
 }
 
-/// A specification that is not valid.
+/// Error: the specification is not valid.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct MisbehaviourError {
     text: String,
@@ -148,19 +150,16 @@ pub struct MisbehaviourError {
 impl fmt::Display for MisbehaviourError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let MisbehaviourError { text, reason } = self;
-        write!(
-            f,
-            "`{text}`: {reason}; see `supple-emu --help` for all kinds"
-        )
+        write!(f, "`{text}`: {reason}; `supple-emu --help` lists all kinds")
     }
 }
 
 impl core::error::Error for MisbehaviourError {}
 
-/// The keys of a specification, each to be used once.
-struct Keys<'a>(Vec<(&'a str, &'a str)>);
+/// Keys of a specification that have not been read; reading a key removes it.
+struct UnreadKeys<'a>(Vec<(&'a str, &'a str)>);
 
-impl Keys<'_> {
+impl UnreadKeys<'_> {
     fn take(&mut self, key: &str) -> Option<String> {
         let at = self.0.iter().position(|(name, _)| *name == key)?;
         Some(self.0.remove(at).1.to_owned())
@@ -200,7 +199,7 @@ fn parse(text: &str) -> Result<Misbehaviour, String> {
                 .ok_or(format!("`{pair}` is not key=value"))?,
         );
     }
-    let mut keys = Keys(pairs);
+    let mut keys = UnreadKeys(pairs);
     let kind = match name {
         "error" => {
             let code = keys.take("code").ok_or("code is missing")?;
@@ -254,7 +253,7 @@ fn parse(text: &str) -> Result<Misbehaviour, String> {
         "classic" => MisbehaviourKind::Classic,
         "bus-off" => MisbehaviourKind::BusOff,
         "wedged" => MisbehaviourKind::Wedged,
-        other => return Err(format!("there is no kind `{other}`")),
+        other => return Err(format!("the kind `{other}` does not exist")),
     };
     let of_the_bus = matches!(kind, MisbehaviourKind::BusOff | MisbehaviourKind::Wedged);
     let motor = match of_the_bus {

@@ -1,8 +1,8 @@
-//! Damiao joint motors on their bus, over the simulated plant: what a host sees of an OpenArm or a YAM.
+//! Emulated Damiao joint motors on their bus, which move the simulated plant: an OpenArm or a YAM as the host observes it.
 //!
-//! Facts that the maker has not published are parameters or assumptions, each stated where it is made. A frame that would
-//! write flash ends the emulation with a panic unless [`DamiaoConfig::allow_flash`] is set: no running program may send
-//! one.
+//! Facts that the maker has not published are parameters or assumptions; each is documented at its definition. A frame that
+//! would write flash ends the emulation with a panic, because no drive may send one, unless [`DamiaoConfig::allow_flash`] is
+//! set.
 
 mod arm;
 mod config;

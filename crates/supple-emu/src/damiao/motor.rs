@@ -1,7 +1,7 @@
-//! One emulated motor: state, registers, replies, torque.
+//! One emulated motor: status, registers, replies and torque.
 //!
-//! Positions are those of the output shaft; codes are truncated, as the motors' own encoders are assumed to do. The
-//! torque follows the last command, whether it came before or after the motor was enabled, until the watchdog ends it.
+//! Positions are positions of the output shaft. Codes are truncated, because the motors are assumed to truncate them. The
+//! torque follows the last command, even if the command arrived before the motor was enabled, until the watchdog ends it.
 
 use super::config::MotorConfig;
 use super::misbehaviour::MisbehaviourKind;
@@ -12,25 +12,25 @@ use supple_damiao::code::LinearCode;
 use supple_damiao::inspection::MIT_MODE;
 use supple_damiao::register::{Access, Operation};
 use supple_damiao::{
-    Feedback, Frame, MitCodes, Register, RegisterReply, Request, Special, Status, Value,
+    Feedback, Frame, MitCodes, Register, RegisterReply, Request, SpecialCommand, Status, Value,
 };
 
 /// Units of TIMEOUT \[ns\].
 const TIMEOUT_UNIT_NS: u64 = 50_000;
 /// Bandwidth of the reported torque \[Hz\], an assumption.
 const TORQUE_BANDWIDTH_HZ: f64 = 200.0;
-/// Heating \[degrees Celsius/s\] per squared share of the peak torque, and the time constant of cooling \[s\]:
-/// assumptions that bring a motor at a third of its peak from 30 to about 60 degrees.
+/// Heating \[degrees Celsius/s\] per squared fraction of the peak torque, and time constant of cooling \[s\]. With these
+/// assumed values, a motor at a third of its peak torque warms from 30 to about 60 degrees.
 const HEATING_PER_S: f64 = 0.9;
 const COOLING_S: f64 = 300.0;
 const AMBIENT_CELSIUS: f64 = 25.0;
 
-/// What a frame led to.
+/// Reaction of the motor to a frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Reaction {
     /// Reply, if any.
     pub reply: Option<CanFrame>,
-    /// What the frame asked for, if it would have written flash.
+    /// Request of the frame, if it writes flash.
     pub flash: Option<Request>,
 }
 
@@ -44,23 +44,23 @@ pub struct Motor {
     command: Option<MitCodes>,
     /// Time of the last command while enabled \[ns\].
     commanded_ns: u64,
-    /// Position of the shaft, turns included \[rad\].
+    /// Position of the shaft, including whole turns \[rad\].
     position_rad: f64,
     velocity_rad_per_s: f64,
-    /// Whole turns and error of the zero that the motor adds \[rad\].
+    /// Offset that the motor adds to the position, from whole turns and a shifted zero position \[rad\].
     shift_rad: f64,
     reported_velocity_rad_per_s: f64,
     reported_torque_nm: f64,
     celsius: f64,
-    /// Temperatures are known from the second reply on.
+    /// Whether the motor has replied; it reports temperatures from the second reply on.
     replied: bool,
     silent: bool,
-    /// Writes that are still ignored.
+    /// Number of writes that are still ignored.
     ignored_writes: u32,
     watchdog_stuck: bool,
-    /// Sign of the torque that is fed forward: -1 if the host has it wrong.
+    /// Sign of the commanded torque: -1 if the host uses the wrong sign.
     torque_sign: f64,
-    /// Every how many replies one is dropped; 0 for none.
+    /// One of this number of replies is dropped; 0 for none.
     drop_every: u32,
     replies: u32,
     late_ns: u64,
@@ -98,12 +98,12 @@ impl Motor {
         self.status
     }
 
-    /// Time of the last command that it had while enabled \[ns\].
+    /// Time of the last command while the motor was enabled \[ns\].
     pub fn commanded_ns(&self) -> u64 {
         self.commanded_ns
     }
 
-    /// Bytes of a register, as a host would read them.
+    /// Bytes of a register, as a host reads them.
     pub fn register(&self, register: Register) -> [u8; 4] {
         match register {
             Register::SHAFT_POSITION | Register::MOTOR_POSITION => {
@@ -123,7 +123,7 @@ impl Motor {
         self.status != Status::Enabled && self.config.brakes_when_disabled
     }
 
-    /// Further delay of replies \[ns\].
+    /// Additional delay of replies \[ns\].
     pub(super) fn late_ns(&self) -> u64 {
         self.late_ns
     }
@@ -133,7 +133,7 @@ impl Motor {
         self.position_rad + self.shift_rad
     }
 
-    /// Joint torque of the motor, as its current control estimates it \[N m\].
+    /// Torque of the motor at the joint, as its current controller estimates it \[N m\].
     pub fn joint_torque_nm(&self) -> f64 {
         self.config.direction * self.shaft_torque_nm()
     }
@@ -155,7 +155,7 @@ impl Motor {
         torque_nm.clamp(-limit_nm, limit_nm)
     }
 
-    /// Takes the joint's motion, and advances watchdog, filters and temperature by `step_s`.
+    /// Updates the motion of the joint, and advances watchdog, filters and temperature by `step_s`.
     pub(super) fn tick(&mut self, now_ns: u64, joint_rad: f64, joint_rad_per_s: f64, step_s: f64) {
         let direction = self.config.direction;
         self.position_rad = direction * (joint_rad - self.config.zero_offset_rad);
@@ -186,7 +186,7 @@ impl Motor {
         }
     }
 
-    /// Reads a frame of the host. `allow_flash` obeys frames that write flash.
+    /// Processes a frame of the host. With `allow_flash`, the motor also executes requests that write flash.
     pub(super) fn handle_frame(
         &mut self,
         now_ns: u64,
@@ -207,7 +207,7 @@ impl Motor {
         if flash.is_some() && !allow_flash {
             return Reaction { reply: None, flash };
         }
-        let reply = self.obey(now_ns, request, id);
+        let reply = self.execute(now_ns, request, id);
         self.replies = self.replies.wrapping_add(1);
         let dropped = self.drop_every > 0 && self.replies.is_multiple_of(self.drop_every);
         let format = match self.ram.is_fd() {
@@ -220,7 +220,7 @@ impl Motor {
         Reaction { reply, flash }
     }
 
-    fn obey(&mut self, now_ns: u64, request: Request, id: u8) -> Option<Frame> {
+    fn execute(&mut self, now_ns: u64, request: Request, id: u8) -> Option<Frame> {
         let reply_id = self.ram.integer(Register::REPLY_ID) as u16;
         match request {
             Request::Mit(codes) => {
@@ -229,18 +229,18 @@ impl Motor {
                     self.commanded_ns = now_ns;
                 }
             }
-            Request::Special(Special::Enable) => {
+            Request::SpecialCommand(SpecialCommand::Enable) => {
                 if self.status == Status::Disabled {
                     self.status = Status::Enabled;
                 }
                 self.commanded_ns = now_ns;
             }
-            Request::Special(Special::Disable) => {
+            Request::SpecialCommand(SpecialCommand::Disable) => {
                 if self.status == Status::Enabled {
                     self.status = Status::Disabled;
                 }
             }
-            Request::Special(Special::ClearError) => {
+            Request::SpecialCommand(SpecialCommand::ClearError) => {
                 if self.status.is_error() {
                     self.status = Status::Disabled;
                 }
@@ -265,7 +265,7 @@ impl Motor {
                     Operation::Write,
                 ));
             }
-            // Modes that no program here uses: the motor answers, and holds no torque.
+            // No program of this project uses the other modes: the motor answers and applies no torque.
             Request::PositionVelocity(..)
             | Request::Velocity(_)
             | Request::ForcePosition(..)
@@ -309,13 +309,13 @@ impl Motor {
         }
     }
 
-    /// Begins to misbehave.
+    /// Begins a misbehaviour.
     pub(super) fn misbehave(&mut self, kind: MisbehaviourKind) {
         match kind {
             MisbehaviourKind::Error { status } => self.status = status,
             MisbehaviourKind::Silent => self.silent = true,
             MisbehaviourKind::Reappears => {
-                // The supply was gone for a moment: what was not stored is lost.
+                // The supply was interrupted: values that were not stored in flash are lost.
                 self.ram = self.flash.clone();
                 self.status = Status::Disabled;
                 self.command = None;
@@ -341,7 +341,7 @@ impl Motor {
         }
     }
 
-    /// Ids \[what it listens to, what it replies with\].
+    /// Ids of frames to the motor and of its replies.
     pub(super) fn ids(&self) -> [u32; 2] {
         [Register::ID, Register::REPLY_ID].map(|register| self.ram.integer(register))
     }
@@ -354,7 +354,7 @@ impl Motor {
     }
 }
 
-/// The code below a value, as the motors and the public drivers compute it.
+/// Returns the next code below a value, as the motors and the public drivers compute it.
 fn truncated(code: &LinearCode, value: f64) -> u16 {
     let range = code.max();
     let value = value.clamp(-range, range);

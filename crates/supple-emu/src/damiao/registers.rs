@@ -1,4 +1,4 @@
-//! One bank of the registers of a motor; `motor.rs` keeps one in RAM and one in flash.
+//! One bank of motor registers; a motor has one bank in RAM and one in flash.
 
 use super::config::MotorConfig;
 use supple_damiao::register::REGISTERS;
@@ -6,16 +6,16 @@ use supple_damiao::{Ranges, Register, Value};
 
 /// Number of registers.
 const COUNT: usize = 128;
-/// can_br of classic frames at 1 Mbit/s and of FD frames at 5 Mbit/s.
+/// Values of can_br for classic frames at 1 Mbit/s and for FD frames at 5 Mbit/s.
 const BIT_RATES: [u32; 2] = [4, 9];
 
-/// All registers as four bytes each; those that the firmware does not have read as zero.
+/// All registers, four bytes each; a register that the firmware does not have is zero.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Registers([[u8; 4]; COUNT]);
 
 impl Registers {
-    /// Registers of a motor that has been set up: those of the maker's parameter file for a DM4310; ids, timeout, ranges, gear ratio,
-    /// pole pairs, flux and bit rates are those of `config`.
+    /// Returns the registers of a configured motor. Ids, timeout, ranges, gear ratio, pole pairs, flux and bit rates are taken from
+    /// `config`, all other registers from the maker's parameter file for a DM4310.
     pub fn new(config: &MotorConfig) -> Registers {
         let mut registers = Registers([[0; 4]; COUNT]);
         let float = |value: f64| Value::Float(value as f32);
@@ -96,7 +96,7 @@ impl Registers {
         f64::from(f32::from_le_bytes(self.bytes(register)))
     }
 
-    /// The motor's own ranges; those of a 4310 if the registers hold nonsense.
+    /// Returns the motor's ranges, or the ranges of a 4310 if the registers are not valid.
     pub fn ranges(&self) -> Ranges {
         let ranges = Ranges::new(
             self.float(Register::POSITION_RANGE),

@@ -1,4 +1,4 @@
-//! Frame durations at 1 Mbit/s, compared with bits counted by hand.
+//! Compares frame durations at 1 Mbit/s with bits counted by hand.
 //!
 //! The position request, id 0x404 and payload 30, from the start bit to the end of its checksum; the bits in
 //! brackets are stuff bits, each after five equal ones:
@@ -14,7 +14,7 @@ use supple_bus::Event;
 
 const US: u64 = 1_000;
 
-/// Duration of a frame of the host without a reply, in microseconds.
+/// Sends a frame that has no reply and returns its duration \[us\].
 fn lasts_us(host: &mut Host, id: u32, payload: &[u8]) -> u64 {
     host.listen(MS);
     let (begin_ns, busy_ns) = (host.now_ns(), host.arm().bus_busy_ns());
@@ -28,7 +28,7 @@ fn lasts_us(host: &mut Host, id: u32, payload: &[u8]) -> u64 {
 }
 
 #[test]
-fn a_frame_lasts_its_bits() {
+fn frame_durations_equal_bits_counted_by_hand() {
     let mut host = Host::awake();
     for (id, payload, bits) in [
         (0x01f, &[][..], 51),
@@ -47,7 +47,7 @@ fn a_frame_lasts_its_bits() {
 }
 
 #[test]
-fn any_frame_lasts_its_bits() {
+fn random_frame_durations_equal_their_bits() {
     let mut host = Host::awake();
     let mut word = 0x9e37_79b9_7f4a_7c15_u64;
     for length in (0..=8).cycle().take(200) {
@@ -90,7 +90,7 @@ fn count_bits(id: u32, payload: &[u8]) -> u64 {
 /// Request and four replies, all counters at zero: 58 bits, and 78, 77, 77, 77 for ids 0x423, 0x443, 0x463 and
 /// 0x483 with three bytes of zero. The replies follow each other without a gap, after the latency of the pucks.
 #[test]
-fn a_request_for_positions_lasts_all_its_frames() {
+fn a_position_request_takes_the_time_of_all_its_frames() {
     let mut host = Host::awake();
     for puck in 1..=4 {
         host.set(puck, P, 0);

@@ -1,4 +1,4 @@
-//! The real program: invalid arguments are reported with the remedy.
+//! Tests of the program `supple-emu`: it reports invalid arguments with a remedy.
 
 use std::process::{Command, Output};
 

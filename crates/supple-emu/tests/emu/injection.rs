@@ -1,4 +1,4 @@
-//! Injected faults, as the host observes them on the bus.
+//! Tests of injected faults, as the host observes them on the bus.
 
 use crate::support::{ACTIVE, Host, MODE, P};
 use supple_plant::Injection;
@@ -14,7 +14,7 @@ fn injected(specs: &[&str]) -> Host {
     host
 }
 
-/// Positions that the pucks report to separate requests.
+/// Returns the positions that the pucks report to separate requests.
 fn counts(host: &mut Host) -> Vec<Option<i32>> {
     (1..=4)
         .map(|node| {
@@ -41,7 +41,7 @@ fn a_stuck_encoder_reports_a_constant_angle_while_the_arm_falls() {
     let after = counts(&mut host);
     let moved_rad = host.arm().truth().position_rad - then_rad;
     assert!(moved_rad[3].abs() > 0.01, "{moved_rad}");
-    assert_eq!(before[3], after[3], "joint 3 has a motor of its own");
+    assert_eq!(before[3], after[3], "joint 3 has a separate motor");
     assert_ne!(before[1], after[1]);
     assert_eq!(host.arm().injections_begun(), 1);
 }

@@ -1,4 +1,4 @@
-//! The emulated arm, as the host observes it on the bus.
+//! Tests of the emulated arm, as the host observes it on the bus.
 
 mod support;
 

@@ -1,4 +1,4 @@
-//! The pendant socket of the real program: clients that are silent or do not read block no other client.
+//! Tests of the pendant socket of the program `supple-emu`: clients that send nothing or do not read do not block others.
 
 use core::time::Duration;
 use std::io::{Read, Write};
@@ -43,7 +43,7 @@ impl Arm {
     }
 
     /// Sends a line and returns the answer.
-    fn ask(&self, words: &str) -> String {
+    fn send_line(&self, words: &str) -> String {
         let mut stream = self.connect().expect("it listens");
         stream.set_read_timeout(Some(WITHIN)).expect("set");
         writeln!(stream, "{words}").expect("written");
@@ -72,10 +72,10 @@ fn the_emergency_stop_is_not_blocked_by_clients_without_a_complete_line() {
             stream
         })
         .collect();
-    assert!(arm.ask("idle").contains("\"safety_mode\""));
-    assert!(arm.ask("e-stop").contains("EStop"));
+    assert!(arm.send_line("idle").contains("\"safety_mode\""));
+    assert!(arm.send_line("e-stop").contains("EStop"));
     drop(silent);
-    assert!(arm.ask("status").contains("EStop"));
+    assert!(arm.send_line("status").contains("EStop"));
 }
 
 #[test]
@@ -88,19 +88,19 @@ fn clients_that_do_not_read_block_no_other_client() {
             stream
         })
         .collect();
-    // The clients before it have been served by then: it was queued after them.
+    // The line was queued after those of the earlier clients, which have therefore been served.
     loop {
-        let answer = arm.ask("e-stop");
+        let answer = arm.send_line("e-stop");
         if answer.contains("EStop") {
             break;
         }
-        // Too many answers were pending: the command is carried out anyway.
+        // Too many answers were pending: the command is executed without an answer.
         assert_eq!(answer, "");
     }
     drop(deaf);
 }
 
-/// A line in pieces, and one without a newline from a client that has closed its sending side.
+/// Tests a line that arrives in pieces, and a line without a newline from a client that has closed its sending side.
 #[test]
 fn a_line_may_arrive_in_pieces() {
     let arm = Arm::start();
@@ -117,9 +117,9 @@ fn a_line_may_arrive_in_pieces() {
 }
 
 #[test]
-fn a_line_that_is_too_long_is_refused_and_does_nothing() {
+fn a_line_that_is_too_long_is_refused_without_effect() {
     let arm = Arm::start();
-    assert!(!arm.ask("idle").contains("EStop"));
+    assert!(!arm.send_line("idle").contains("EStop"));
     let mut stream = arm.connect().expect("it listens");
     stream.set_read_timeout(Some(WITHIN)).expect("set");
     let line = format!("e-stop{}", " ".repeat(250));
@@ -127,5 +127,5 @@ fn a_line_that_is_too_long_is_refused_and_does_nothing() {
     let mut answer = String::new();
     stream.read_to_string(&mut answer).expect("an answer");
     assert!(answer.contains("at most 256 bytes"), "{answer}");
-    assert!(!arm.ask("status").contains("EStop"));
+    assert!(!arm.send_line("status").contains("EStop"));
 }

@@ -1,4 +1,4 @@
-//! Motor pucks: states, ids by firmware, torques.
+//! Tests of motor pucks: power states, property ids by firmware, torques.
 
 use crate::support::{E_STOP, Host, IDLE, MODE, MODULE, MS, MT, P, STAT, VERS, ZERO, packed};
 use supple_bus::{BusFault, Event};
@@ -34,7 +34,7 @@ fn ids_depend_on_the_firmware() {
     }
 }
 
-/// Before version 61 the position is 26.
+/// Before version 61, the property id of the position is 26.
 #[test]
 fn old_firmware_has_another_id_for_the_position() {
     let position = |version, id| {
@@ -88,7 +88,7 @@ fn waking_takes_the_configured_time() {
     assert_eq!(host.get(1, P).map(|reply| reply.len()), Some(3));
 }
 
-/// Transceivers leave the bus and return: a frame of the host then makes it go bus-off, for 100 ms.
+/// While the transceivers of the pucks reset, a frame of the host makes the host go bus-off for 100 ms.
 #[test]
 fn sending_while_pucks_wake_makes_the_host_go_bus_off() {
     let mut host = Host::new(EmulatorConfig::wam(4));
@@ -124,7 +124,7 @@ fn a_counter_wraps_at_22_bits() {
     }
 }
 
-/// 2700 units per N m; at most MT; zero in idle.
+/// The torque has 2700 units per N m, is at most MT, and is zero in idle.
 #[test]
 fn torques_are_scaled_limited_and_ignored_in_idle() {
     let torque_nm = |host: &mut Host, torques| {
@@ -145,7 +145,7 @@ fn torques_are_scaled_limited_and_ignored_in_idle() {
     assert_eq!(torque_nm(&mut host, [0, 0, -4000, 0])[2], -1000.0 / 2700.0);
 }
 
-/// The emergency stop switches the power off: counts are lost, and all pucks return to the monitor.
+/// The emergency stop switches the power off: the pucks lose their counts and return to the monitor.
 #[test]
 fn an_emergency_stop_resets_the_pucks() {
     let mut host = Host::active();

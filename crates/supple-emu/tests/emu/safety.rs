@@ -1,4 +1,4 @@
-//! The safety module: causes of idle and of the emergency stop, rejected requests, and the state of the pendant.
+//! Tests of the safety module: causes of idle and of the emergency stop, rejected requests, and the state of the pendant.
 
 use crate::support::*;
 use supple_core::dynamics::{joint_poses, tip_pose};
@@ -15,8 +15,8 @@ fn motors_in(host: &Host, mode: MotorMode) -> bool {
     host.arm().pucks().iter().all(|puck| puck.mode() == mode)
 }
 
-/// The default limits are 4731 and 5204: a torque above the first is a warning, one above the second switches the arm
-/// to idle.
+/// The default limits are 4731 and 5204: a torque above the first causes a warning, a torque above the second
+/// switches the arm to idle.
 #[test]
 fn torque_faults_follow_the_commanded_torque() {
     for (torque, lamp, mode) in [
@@ -68,7 +68,7 @@ fn host_can_only_lower_the_mode() {
 
 /// Missing positions switch the arm to idle after the configured time, and not before.
 #[test]
-fn heartbeat_fault_when_polling_stops() {
+fn missing_positions_cause_a_heartbeat_fault() {
     for heartbeat_ns in [100 * MS, 50 * MS] {
         let mut config = EmulatorConfig {
             zeroed: true,
@@ -112,7 +112,7 @@ fn the_bus_voltage_is_monitored() {
 
 /// A fault stays on the pendant and blocks activation until Shift-Idle.
 #[test]
-fn a_fault_is_cleared_only_at_the_pendant() {
+fn a_fault_is_cleared_only_on_the_pendant() {
     let mut host = Host::active();
     host.send(0x401, &packed([8191, 0, 0, 0]));
     host.listen(MS);
@@ -159,7 +159,7 @@ fn a_falling_arm_is_stopped_at_the_limit() {
         warned |= host.arm().safety().pendant().velocity == supple_puck::safety::Level::Warning;
     }
     assert_eq!(cause(&host), Cause::Velocity);
-    // An arm in free fall becomes 5 cm/s faster during the five milliseconds from which the module computes the speed.
+    // The speed of a falling arm increases by 5 cm/s in the five milliseconds over which the module computes it.
     assert!((0.5..0.56).contains(&speed), "{speed} m/s");
     assert!(warned);
     assert_eq!(host.lamps()[0], FAULT);
@@ -213,7 +213,7 @@ fn an_arm_that_does_not_slow_down_enters_the_emergency_stop() {
         shift_position(&mut host, 500, 20);
         assert_eq!(host.module_mode(), IDLE);
         shift_position(&mut host, 500, 350);
-        assert_eq!(host.module_mode(), IDLE, "not yet half a second");
+        assert_eq!(host.module_mode(), IDLE, "half a second has not passed");
         shift_position(&mut host, if keeps_moving { 500 } else { 0 }, 100);
         assert_eq!(host.module_mode(), mode);
     }

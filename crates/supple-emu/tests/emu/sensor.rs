@@ -1,4 +1,4 @@
-//! The force/torque sensor: two little-endian frames, and a tare time of a little over a second.
+//! Tests of the force/torque sensor: two little-endian frames, and a tare time of slightly more than a second.
 
 use crate::support::{Host, MS};
 
@@ -19,7 +19,7 @@ fn a_reading_is_a_force_frame_and_a_torque_frame_with_status() {
     host.listen(MS);
     let (force, torque) = read(&mut host);
     assert_eq!((force.len(), torque.len()), (6, 7));
-    // Nothing touches the tip: 1 N is 256 counts.
+    // No force acts on the tip; 1 N is 256 counts.
     for axis in force.chunks(2) {
         assert!(
             i16::from_le_bytes([axis[0], axis[1]]).abs() < 26,

@@ -1,4 +1,4 @@
-//! Sent by the plant to the controller once per cycle.
+//! Arm state: message from the plant to the controller, once per cycle.
 
 use super::common::{Drives, MAX_DOF, MessageError, expect_dof, padded};
 use iceoryx2::prelude::ZeroCopySend;
@@ -23,7 +23,7 @@ pub struct ArmState {
     pub tip_force_n: [f64; 3],
     /// Status report of the plant.
     pub plant: PlantReport,
-    /// Joints of the arm.
+    /// Number of joints of the arm.
     pub dof: u8,
     /// Bit `i` is set if the encoder of joint `i` answered.
     pub position_present: u8,
@@ -35,20 +35,20 @@ pub struct ArmState {
     pub reserved: [u8; 4],
 }
 
-/// Counters and times of the process that owns the clock. Counts are since its start.
+/// Counters and times of the plant. Counters are since its start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, ZeroCopySend)]
 #[repr(C)]
 #[type_name("supple.PlantReport.v3")]
 pub struct PlantReport {
-    /// Cycles whose answer did not arrive in time.
+    /// Number of cycles whose answer did not arrive in time.
     pub missed: u64,
-    /// Answers that arrived after their cycle.
+    /// Number of answers that arrived after their cycle.
     pub late: u64,
-    /// Torque commands discarded because this system's controller did not write them.
+    /// Number of torque commands discarded because this system's controller did not write them.
     pub foreign: u64,
-    /// Torque commands treated as missing answers: for another number of joints, or not finite.
+    /// Number of torque commands treated as missing answers, because they are for another number of joints or not finite.
     pub unusable: u64,
-    /// Frames whose transmission was not confirmed; 0 without a bus.
+    /// Number of frames whose transmission was not confirmed; 0 without a bus.
     pub tx_lost: u64,
     /// Delay of the start of this cycle \[ns\]; 0 in virtual time.
     pub wake_ns: u64,
@@ -93,7 +93,7 @@ impl ArmState {
         }
     }
 
-    /// Input of the controller's step.
+    /// Converts the state to the input of the controller's step.
     ///
     /// # Errors
     /// [`MessageError::Dof`] if the arm does not have `N` joints.

@@ -1,4 +1,4 @@
-//! What the messages share: state of the drives, values for each joint, errors.
+//! Types shared by the messages: state of the drives, values for each joint, errors.
 
 /// Maximum number of joints of an arm.
 pub const MAX_DOF: usize = 7;
@@ -7,14 +7,14 @@ pub const MAX_DOF: usize = 7;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Drives {
-    /// Emergency stop: no power.
+    /// The motors have no power: emergency stop.
     Off = 0,
-    /// Motors brake, torques are ignored.
+    /// The motors brake and ignore torques.
     Idle = 1,
     /// The motors produce the commanded torques.
     Active = 2,
-    /// The motors have torque, but not the commanded one: the plant holds an arm that falls without torque, or lays it
-    /// down.
+    /// The motors apply torques of the plant instead of the controller's: the plant holds an arm that falls without torque, or
+    /// lays it down.
     Held = 3,
 }
 
@@ -26,7 +26,7 @@ impl Drives {
             .find(|drives| *drives as u8 == code)
     }
 
-    /// What the state means for a person, where its name does not state it.
+    /// Returns a warning for a person near the arm, if the name of the state does not express the hazard.
     pub fn caution(self) -> &'static str {
         match self {
             Drives::Held => {
@@ -47,7 +47,7 @@ impl Drives {
     }
 }
 
-/// A message that its reader cannot use.
+/// Error: the reader cannot use a message.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum MessageError {
     /// The message is for another number of joints.
@@ -58,17 +58,17 @@ pub enum MessageError {
     Dof {
         /// Name of the message.
         message: &'static str,
-        /// Joints of the message.
+        /// Number of joints in the message.
         found: u8,
-        /// Joints of the reader.
+        /// Number of joints that the reader expects.
         expected: usize,
     },
-    /// The values are not a valid request.
+    /// The values do not form a valid request.
     #[error("the request cannot be read: {0}")]
     Request(supple_core::codes::RequestCodeError),
 }
 
-/// Checks that the message is for this arm.
+/// Checks that the message is for an arm with this number of joints.
 pub(super) fn expect_dof(
     message: &'static str,
     found: u8,
@@ -84,7 +84,7 @@ pub(super) fn expect_dof(
     })
 }
 
-/// Values of `N` joints, padded with zeros.
+/// Pads the values of `N` joints with zeros.
 pub(super) fn padded<const N: usize>(values: &[f64]) -> [f64; MAX_DOF] {
     const { assert!(N <= MAX_DOF) };
     let mut all = [0.0; MAX_DOF];
@@ -92,7 +92,7 @@ pub(super) fn padded<const N: usize>(values: &[f64]) -> [f64; MAX_DOF] {
     all
 }
 
-/// The first `N` values.
+/// Returns the first `N` values.
 pub(super) fn first_values<const N: usize>(all: &[f64; MAX_DOF]) -> [f64; N] {
     const { assert!(N <= MAX_DOF) };
     core::array::from_fn(|i| all[i])

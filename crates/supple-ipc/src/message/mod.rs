@@ -1,9 +1,9 @@
-//! The messages between the processes: plain old data of fixed size and layout.
+//! The messages between the processes: plain data of fixed size and layout.
 //!
 //! Values are in SI units, times as integers in ns (`_ns`); arrays over the joints have [`MAX_DOF`] entries and are zero
-//! beyond the arm's joints; flags are bytes, kinds are the codes of [`supple_core::codes`]. There is no padding, so no
-//! uninitialised byte is shared. The type name in shared memory (`supple.ArmState.v4`) carries a version: a change of
-//! meaning or layout is a new version, and a peer of another version is refused.
+//! beyond the arm's joints. Flags are bytes, kinds are the codes of [`supple_core::codes`]. The messages have no padding, so
+//! no uninitialised byte is shared. The type name in shared memory (`supple.ArmState.v4`) contains a version: every change of
+//! meaning or layout increments it, and a process with another version is refused.
 
 mod arm_state;
 mod common;

@@ -6,7 +6,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use supple_core::codes::{self, RequestCode, VALUES, request_kind};
 use supple_core::controller::{Mode, Request};
 
-/// A request. The controller checks every field before it uses it.
+/// A request of an operator. The controller checks every field before it uses the request.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
 #[type_name("supple.OperatorRequest.v1")]
@@ -76,27 +76,28 @@ impl OperatorRequest {
         !self.is_scheduled() && self.requests_idle()
     }
 
-    /// A set-point, of which a newer one replaces an older.
+    /// Whether the request is a set-point; a newer set-point replaces an older one that waits.
     pub fn is_set_point(&self) -> bool {
         self.kind == request_kind::SET_POINT
     }
 
-    /// Whether it waits for a given cycle.
+    /// Whether the request waits for a given cycle.
     pub fn is_scheduled(&self) -> bool {
         self.has_at_cycle != 0
     }
 
-    /// Whether it requests idle, now or in a given cycle.
+    /// Whether the request is for idle, now or in a given cycle.
     pub fn requests_idle(&self) -> bool {
         self.kind == request_kind::IDLE
     }
 
-    /// Whether it is for a cycle that is not after `idle`, in which idle was accepted, which then overrides it.
+    /// Whether the request is for the cycle `idle` or an earlier one. The idle request that was accepted in that cycle then
+    /// overrides it.
     pub fn is_before(&self, idle: u64) -> bool {
         self.is_scheduled() && !self.requests_idle() && self.at_cycle <= idle
     }
 
-    /// Whether it may take effect in this cycle.
+    /// Whether the request may take effect in this cycle.
     pub fn is_due(&self, cycle: u64) -> bool {
         !self.is_scheduled() || cycle >= self.at_cycle
     }
@@ -106,16 +107,16 @@ impl OperatorRequest {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Outcome {
-    /// Queued until its cycle; a second reply will follow.
+    /// The request is queued until its cycle; a second reply will follow.
     Queued = 1,
-    /// The controller carries it out.
+    /// The controller executes the request.
     Accepted = 2,
-    /// Refused; the text gives the reason.
+    /// The controller refuses the request; the text gives the reason.
     Refused = 3,
 }
 
 impl Outcome {
-    /// Converts a code; an unknown code counts as refused.
+    /// Converts a code; an unknown code becomes [`Outcome::Refused`].
     pub fn from_code(code: u8) -> Outcome {
         [Outcome::Queued, Outcome::Accepted]
             .into_iter()
@@ -124,7 +125,7 @@ impl Outcome {
     }
 }
 
-/// The answer to a request.
+/// The reply of the controller to a request.
 #[derive(Clone, Copy, Debug, PartialEq, ZeroCopySend)]
 #[repr(C)]
 #[type_name("supple.OperatorReply.v1")]
@@ -165,12 +166,12 @@ impl OperatorReply {
         }
     }
 
-    /// Result; an unknown code counts as refused.
+    /// Returns the result; an unknown code becomes [`Outcome::Refused`].
     pub fn outcome(&self) -> Outcome {
         Outcome::from_code(self.outcome)
     }
 
-    /// Mode after the request, if this version has it.
+    /// Returns the mode after the request; `None` if this version does not know its code.
     pub fn mode(&self) -> Option<Mode> {
         codes::mode(self.mode)
     }

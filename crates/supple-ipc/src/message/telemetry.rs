@@ -1,4 +1,4 @@
-//! Telemetry of one cycle of the controller: for logs, status lines and people.
+//! Telemetry of one cycle of the controller, for logs and displays.
 
 use super::ArmState;
 use super::common::MAX_DOF;
@@ -6,7 +6,7 @@ use iceoryx2::prelude::ZeroCopySend;
 use supple_core::controller::CycleRecord;
 use supple_core::{Input, Output};
 
-/// Words of the record of the largest arm.
+/// Number of words in the record of the largest arm.
 const WORDS: usize = CycleRecord::<MAX_DOF>::words(MAX_DOF);
 
 /// One cycle of the controller: input, output and timing.
@@ -16,11 +16,12 @@ const WORDS: usize = CycleRecord::<MAX_DOF>::words(MAX_DOF);
 pub struct Telemetry {
     /// The state that the controller received, with the report of the plant.
     pub state: ArmState,
-    /// Arm states dropped since the start: of another writer than this system's plant, or of another arm.
+    /// Number of arm states discarded since the start, because they were not written by this system's plant or were of another
+    /// arm.
     pub states_dropped: u64,
     /// Times of this cycle.
     pub timing: CycleTiming,
-    /// The record of the cycle, see [`CycleRecord::pack`]; zero beyond it.
+    /// The record of the cycle, see [`CycleRecord::pack`]; the remaining words are zero.
     words: [u64; WORDS],
 }
 
@@ -29,16 +30,16 @@ pub struct Telemetry {
 #[repr(C)]
 #[type_name("supple.CycleTiming.v1")]
 pub struct CycleTiming {
-    /// Since the previous step began \[ns\]; 0 in the first.
+    /// Time since the start of the previous step \[ns\]; 0 in the first cycle.
     pub period_ns: u64,
-    /// From the measurement to the beginning of the step \[ns\]; 0 in virtual time.
+    /// Time from the measurement to the start of the step \[ns\]; 0 in virtual time.
     pub latency_ns: u64,
-    /// From there until its torques are known, with a look for requests \[ns\].
+    /// Duration of the step, including the check for requests \[ns\].
     pub step_ns: u64,
 }
 
 impl Telemetry {
-    /// Records a step; `step` is its number since the controller started.
+    /// Creates the telemetry of a step; `step` is the number of the step since the controller started.
     pub fn new<const N: usize>(
         step: u64,
         state: &ArmState,
@@ -49,7 +50,7 @@ impl Telemetry {
         Telemetry::of(&CycleRecord::new(step, input, output), state, timing)
     }
 
-    /// Of a record.
+    /// Creates telemetry from a record.
     pub fn of<const N: usize>(
         record: &CycleRecord<N>,
         state: &ArmState,
@@ -71,18 +72,18 @@ impl Telemetry {
         usize::from(self.state.dof).min(MAX_DOF)
     }
 
-    /// Number of the step since the controller started; a reader that sees a gap has lost records.
+    /// Number of the step since the controller started; a gap in the numbers means that the reader has lost records.
     pub fn step(&self) -> u64 {
-        // The first field of the record: no other has to be read for it.
+        // The step number is the first field of the record; no other field is decoded.
         self.words[0]
     }
 
-    /// The record of the cycle; the values of joints that the arm does not have are zero.
+    /// Returns the record of the cycle; the values of joints that the arm does not have are zero.
     pub fn record(&self) -> CycleRecord<MAX_DOF> {
         self.record_of()
     }
 
-    /// The record of the cycle, of the first `N` joints.
+    /// Returns the record of the cycle for the first `N` joints.
     pub fn record_of<const N: usize>(&self) -> CycleRecord<N> {
         CycleRecord::unpack(&self.words, self.dof())
     }

@@ -1,4 +1,4 @@
-//! Sent by the controller to the plant: the answer to one arm state.
+//! Torque command: message from the controller to the plant, the answer to one arm state.
 
 use super::common::{Drives, MAX_DOF, MessageError, expect_dof, first_values, padded};
 use iceoryx2::prelude::ZeroCopySend;
@@ -20,13 +20,13 @@ pub struct TorqueCommand {
     /// Joint torques that the plant applies while answers are missing, for at most 100 ms \[N m\]: gravity torques at
     /// the last trusted pose.
     pub fallback_torque_nm: [f64; MAX_DOF],
-    /// Joints of the arm.
+    /// Number of joints of the arm.
     pub dof: u8,
     /// Mode, a code of [`codes::MODES`].
     pub mode: u8,
     /// Kind of the latched fault, see [`codes::FaultCode`]; 0 for none.
     pub fault: u8,
-    /// Its safe action, see [`codes::safe_action`]; 0 for none.
+    /// Safe action of the latched fault, see [`codes::safe_action`]; 0 for none.
     pub safe_action: u8,
     /// Requested drive state. [`Drives::Active`]: apply the torques. [`Drives::Idle`]: the controller requests no
     /// torque, or is about to exit; the plant switches the drives to idle, in which the motors brake, and applies the
@@ -37,7 +37,7 @@ pub struct TorqueCommand {
 }
 
 impl TorqueCommand {
-    /// Converts the output of a step. `shutting_down`: the controller is about to exit.
+    /// Creates the command from the output of a step; `shutting_down` means that the controller is about to exit.
     pub fn new<const N: usize>(output: &Output<N>, shutting_down: bool) -> TorqueCommand {
         let drives = if output.torque_off || shutting_down {
             Drives::Idle
@@ -85,7 +85,7 @@ impl TorqueCommand {
         Ok(Vector::from(first_values::<N>(&self.fallback_torque_nm)))
     }
 
-    /// Mode of the controller, if this version has it.
+    /// Returns the mode of the controller; `None` if this version does not know its code.
     pub fn mode(&self) -> Option<Mode> {
         codes::mode(self.mode)
     }

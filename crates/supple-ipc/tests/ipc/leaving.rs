@@ -20,13 +20,17 @@ fn last_process_removes_all_objects() {
     let reader = TelemetryReader::new(&system.domain).expect("a reader");
     assert_ne!(support::objects(&system.domain), NONE);
     drop((operator, plant, server, reader));
-    assert_ne!(support::objects(&system.domain), NONE, "one is still there");
+    assert_ne!(
+        support::objects(&system.domain),
+        NONE,
+        "one process is still connected"
+    );
     drop(controller);
     assert_eq!(support::objects(&system.domain), NONE);
 }
 
 #[test]
-fn earlier_leavers_do_not_affect_the_others() {
+fn a_process_that_leaves_does_not_affect_the_others() {
     let system = support::system("earlier");
     let plant = PlantLink::new(&system.domain).expect("a plant");
     let controller = ControllerLink::new(&system.domain).expect("a controller");
@@ -47,8 +51,8 @@ fn earlier_leavers_do_not_affect_the_others() {
     }
 }
 
-/// Each process that has ended leaves an empty folder, and every process that joins lists all of them: an operator would be
-/// connected later and later. Only old and empty ones are removed: others may be of a process that is joining.
+/// Each process that has ended leaves an empty folder, and every process that joins lists all folders, which delays it. Only
+/// old and empty folders are removed: another folder may belong to a process that is joining.
 #[test]
 fn folders_of_ended_processes_are_removed() {
     let system = support::system("folders");
@@ -66,14 +70,14 @@ fn folders_of_ended_processes_are_removed() {
     let (new, ..) = folder("2", 0);
     let (used, used_file, _) = folder("3", 0);
     std::fs::write(used.join("details"), "").expect("a file");
-    old_file.set_modified(long_ago).expect("an old folder");
-    used_file.set_modified(long_ago).expect("an old folder");
+    old_file.set_modified(long_ago).expect("the time is set");
+    used_file.set_modified(long_ago).expect("the time is set");
     drop(OperatorClient::new(&system.domain).expect("an operator"));
     assert!(!old.exists() && new.exists() && used.join("details").exists());
     drop(reader);
 }
 
-/// Many clients join and leave a running system at once: none is refused, and no object is left at the end.
+/// Many clients join and leave a running system concurrently: no client is refused, and no object remains at the end.
 #[test]
 fn concurrent_join_and_leave_is_safe() {
     let system = support::system("at-once");

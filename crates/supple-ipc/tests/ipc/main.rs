@@ -1,4 +1,4 @@
-//! Messages and services between the threads of one process.
+//! Tests of messages and services between the threads of one process.
 
 #[path = "../../../../tests/support/property.rs"]
 mod property;

@@ -1,4 +1,4 @@
-//! Messages keep their contents bit for bit, and cannot be read for another arm.
+//! Tests that messages keep their contents bit for bit, and that a reader for another arm rejects them.
 
 use crate::property::config;
 use crate::support;
@@ -41,7 +41,7 @@ proptest! {
         let state = ArmState::new::<7>(
             cycle, 0, &position, force, Drives::Idle, PlantReport::default(),
         );
-        let input = state.input::<7>(None).expect("of seven joints");
+        let input = state.input::<7>(None).expect("the state has seven joints");
         prop_assert_eq!(input.cycle, cycle);
         let bits = |p: Option<f64>| p.map(f64::to_bits);
         prop_assert_eq!(input.position_rad.map(bits), position.map(bits));
@@ -117,7 +117,7 @@ fn telemetry_contains_the_request_and_the_refusal() {
             .contains("not possible in mode idle")
     );
     assert_eq!(record.tip_error_m(), None);
-    // For any arm the same, with nothing where there are no joints.
+    // The record for the largest arm has the same values, and zero for joints that the arm does not have.
     let wide = telemetry.record();
     assert_eq!((telemetry.step(), telemetry.dof()), (9, 4));
     assert_eq!(

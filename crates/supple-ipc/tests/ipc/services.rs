@@ -1,5 +1,5 @@
-//! The services: one writer each, prefixes are separate, readers count lost messages, peers of another version are
-//! refused, and only the owner has access.
+//! Tests of the services: each has one writer, systems with different prefixes are separate, readers count lost messages,
+//! processes of another version are refused, and only the owner has access.
 
 use crate::support::{answer, state, system};
 use core::time::Duration;
@@ -33,7 +33,7 @@ fn a_state_is_answered_in_its_cycle() {
 }
 
 #[test]
-fn a_state_may_be_announced() {
+fn an_announcement_wakes_the_controller_before_the_state() {
     let system = system("announced");
     let plant = PlantLink::new(&system.domain).expect("a plant");
     let controller = ControllerLink::new(&system.domain).expect("a controller");
@@ -47,7 +47,7 @@ fn a_state_may_be_announced() {
         }
         plant.publish(&state(cycle)).expect("published");
         if cycle % 5 == 0 {
-            // The state is read before its wake-up is consumed.
+            // The controller reads the state before it consumes the wake-up of the state.
             let received = controller.receive().expect("read");
             assert_eq!(received, Some(state(cycle)));
         } else {
@@ -113,7 +113,7 @@ fn late_controller_receives_every_state() {
     assert_eq!(controller.receive().expect("read"), None);
 }
 
-/// Several processes join and leave at the same time, and so create and remove the same services concurrently.
+/// Several processes join and leave concurrently, and create and remove the same services.
 #[test]
 fn join_succeeds_during_concurrent_joins_and_leaves() {
     let system = system("flux");
@@ -176,9 +176,9 @@ fn second_writer_is_refused_with_the_reason() {
     let _controller = ControllerLink::new(&system.domain).expect("a controller");
     let _server = OperatorServer::new(&system.domain, Backpressure::Drop).expect("a controller");
     let refused = [
-        PlantLink::new(&system.domain).expect_err("there is one"),
-        ControllerLink::new(&system.domain).expect_err("there is one"),
-        OperatorServer::new(&system.domain, Backpressure::Drop).expect_err("there is one"),
+        PlantLink::new(&system.domain).expect_err("a writer exists"),
+        ControllerLink::new(&system.domain).expect_err("a writer exists"),
+        OperatorServer::new(&system.domain, Backpressure::Drop).expect_err("a writer exists"),
     ];
     for error in refused {
         assert!(matches!(error, IpcError::SecondWriter { .. }), "{error}");
@@ -217,12 +217,12 @@ fn telemetry_counts_what_a_slow_reader_loses() {
     let depth = TELEMETRY_DEPTH as u64;
     (0..depth + 10).for_each(publish);
     for step in 0..depth {
-        let telemetry = reader.receive().expect("read").expect("it is there");
+        let telemetry = reader.receive().expect("read").expect("a message arrived");
         assert_eq!(telemetry.step(), step);
     }
     assert_eq!((reader.receive().expect("read"), reader.lost()), (None, 0));
     publish(depth + 10);
-    let next = reader.receive().expect("read").expect("it is there");
+    let next = reader.receive().expect("read").expect("a message arrived");
     assert_eq!((next.step(), reader.lost()), (depth + 10, 10));
 }
 
@@ -280,7 +280,7 @@ fn request_without_a_controller_is_not_sent() {
     assert_eq!(sent, None);
 }
 
-/// A message type of another version with the same name.
+/// A message type with the same name and another version.
 #[derive(Clone, Copy, Debug, ZeroCopySend)]
 #[repr(C)]
 #[type_name("supple.ArmState.v9")]
@@ -310,7 +310,7 @@ fn a_peer_of_another_version_is_refused() {
         assert!(error.to_string().contains(word), "{error}");
     }
     drop((publisher, service, node));
-    drop(ControllerLink::new(&system.domain).expect("no other version is left"));
+    drop(ControllerLink::new(&system.domain).expect("the service of the other version is removed"));
 }
 
 #[test]
@@ -335,7 +335,7 @@ fn folder_accessible_to_other_users_is_refused() {
     }
 }
 
-/// Every file below a folder.
+/// Lists every file below a folder.
 fn files(folder: &StdPath, found: &mut Vec<std::path::PathBuf>) {
     for entry in std::fs::read_dir(folder).expect("readable").flatten() {
         let path = entry.path();
@@ -347,7 +347,8 @@ fn files(folder: &StdPath, found: &mut Vec<std::path::PathBuf>) {
     }
 }
 
-/// One exception: for each node iceoryx2 creates an object of a few bytes, without data, that other users can open.
+/// One kind of object is an exception: for each node, iceoryx2 creates an object of a few bytes without data that other
+/// users can open.
 #[test]
 fn other_users_cannot_open_data() {
     let system = system("permissions");
@@ -371,7 +372,7 @@ fn other_users_cannot_open_data() {
     let in_shared_memory = found.iter().filter(|path| path.starts_with("/dev/shm"));
     assert!(in_shared_memory.count() > 3, "{found:?}");
     for path in found {
-        // Without metadata, a peer has just removed the file.
+        // If the metadata are missing, another process has just removed the file.
         let Ok(metadata) = path.symlink_metadata() else {
             continue;
         };
@@ -385,6 +386,6 @@ fn other_users_cannot_open_data() {
             metadata.mode() & 0o777
         );
     }
-    let folder = system.folder.metadata().expect("it is there");
+    let folder = system.folder.metadata().expect("the folder exists");
     assert_eq!(folder.mode() & 0o777, 0o700);
 }

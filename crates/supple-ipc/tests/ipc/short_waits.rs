@@ -1,4 +1,4 @@
-//! Timeouts below one microsecond expire.
+//! Tests that timeouts below one microsecond expire.
 
 use core::time::Duration;
 use supple_ipc::{ControllerLink, Domain, PlantLink};

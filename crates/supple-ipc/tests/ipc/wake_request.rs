@@ -1,4 +1,4 @@
-//! The controller wakes a blocked plant, at whatever moment the answer is published.
+//! Tests that the controller wakes a blocked plant, whenever it publishes the answer.
 
 use crate::support::{answer, state, system};
 use core::hint::{black_box, spin_loop};
@@ -7,11 +7,11 @@ use supple_ipc::message::TorqueCommand;
 use supple_ipc::{ControllerLink, PlantLink};
 use supple_realtime::pause;
 
-/// Timeout that only a lost wake-up exceeds.
+/// Timeout that is exceeded only if a wake-up is lost.
 const LOST_AFTER: Duration = Duration::from_secs(20);
 const CYCLES: u64 = 100_000;
 
-/// Answers arrive just before, while and after the plant blocks.
+/// Answers arrive shortly before, at and shortly after the time at which the plant blocks.
 #[test]
 fn no_wakeup_is_lost() {
     let system = system("asleep");
@@ -43,7 +43,10 @@ fn no_wakeup_is_lost() {
             plant.publish(&state).expect("published");
             let received = plant.answer(cycle, LOST_AFTER).expect("read");
             assert!(received.answer.is_some());
-            assert!(!received.timed_out, "cycle {cycle} was not notified");
+            assert!(
+                !received.timed_out,
+                "the plant was not notified in cycle {cycle}"
+            );
         }
     });
 }

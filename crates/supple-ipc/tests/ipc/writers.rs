@@ -1,4 +1,4 @@
-//! Readers accept only messages of the process that holds the writer lock.
+//! Tests that readers accept only messages of the process that holds the writer lock.
 
 use crate::support::{System, answer, state, system};
 use core::time::Duration;
@@ -32,7 +32,7 @@ impl<T: core::fmt::Debug + Copy + ZeroCopySend + 'static> ForeignWriter<T> {
             .service_builder(&service.try_into().expect("a name"))
             .publish_subscribe::<T>()
             .open()
-            .expect("it is there");
+            .expect("the service exists");
         let publisher = service.publisher_builder().create();
         ForeignWriter {
             publisher: publisher.expect("a free slot"),
@@ -42,7 +42,7 @@ impl<T: core::fmt::Debug + Copy + ZeroCopySend + 'static> ForeignWriter<T> {
     fn send(&self, message: T) {
         let sample = self.publisher.loan_uninit().expect("memory");
         let reached = sample.write_payload(message).send().expect("sent");
-        assert_eq!(reached, 1, "its reader is connected");
+        assert_eq!(reached, 1, "the reader is connected");
     }
 }
 
@@ -62,7 +62,7 @@ fn torques_of_a_foreign_writer_are_rejected_and_counted() {
     let foreign = ForeignWriter::new(&system, "torque_command");
     for cycle in 0..50 {
         plant.publish(&state(cycle)).expect("published");
-        // Sent before the controller's answer, with another torque, with writer id zero and with a guessed id.
+        // The foreign writer sends another torque before the controller's answer, with writer id zero and with a guessed id.
         for writer in [0, 1 + cycle] {
             foreign.send(TorqueCommand {
                 writer,
@@ -107,7 +107,7 @@ fn states_of_a_foreign_writer_are_rejected_and_counted() {
     assert_eq!(controller.foreign(), 51);
 }
 
-/// Messages of the earlier controllers do not count as foreign, nor those of their successors.
+/// Neither messages of an earlier controller nor messages of its replacement count as foreign.
 #[test]
 fn a_replacement_controller_is_accepted() {
     let system = system("next-writer");

@@ -1,4 +1,4 @@
-//! A killed process can be replaced without a restart of the other side.
+//! Tests that a killed process can be replaced without a restart of the other processes.
 
 use crate::support;
 use core::time::Duration;
@@ -9,7 +9,7 @@ use supple_ipc::{ControllerLink, Domain, PlantLink};
 const FOLDER: &str = "SUPPLE_IPC_TEST_FOLDER";
 const PREFIX: &str = "SUPPLE_IPC_TEST_PREFIX";
 
-/// Not a test: the controller that [`a_killed_controller_is_replaced`] starts and kills.
+/// The controller process that [`a_killed_controller_is_replaced`] starts and kills; not a test itself.
 #[test]
 #[ignore = "started by another test"]
 fn controller_process() {
@@ -54,7 +54,7 @@ fn until_answered(plant: &PlantLink, from: u64) -> u64 {
             return cycle;
         }
     }
-    panic!("no answer came");
+    panic!("no answer arrived");
 }
 
 #[test]
@@ -66,17 +66,19 @@ fn a_killed_controller_is_replaced() {
         let mut child = start(&system);
         cycle = until_answered(&plant, cycle) + 1;
         child.kill().expect("SIGKILL");
-        child.wait().expect("it is gone");
+        child.wait().expect("the process ended");
         let state = ArmState {
             cycle,
             ..support::state(0)
         };
-        plant.publish(&state).expect("a dead reader is no error");
+        plant
+            .publish(&state)
+            .expect("publishing without a live reader succeeds");
         let received = plant.answer(cycle, Duration::from_millis(5));
         assert_eq!(received.expect("read").answer, None);
         cycle += 1;
     }
-    // The last controller was killed too; the last process that leaves removes its objects.
+    // The last controller was killed too; the last process that leaves removes the objects of the controller.
     drop(plant);
     assert_eq!(support::objects(&system.domain), [""; 0]);
 }
@@ -90,21 +92,21 @@ fn a_controller_killed_while_it_joins_is_replaced() {
         let mut child = start(&system);
         supple_realtime::pause(Duration::from_micros(100 * tenths_ms));
         child.kill().expect("SIGKILL");
-        child.wait().expect("it is gone");
+        child.wait().expect("the process ended");
         plant.publish(&support::state(0)).expect("published");
         plant.answer(0, Duration::ZERO).expect("read");
     }
     let mut child = start(&system);
     until_answered(&plant, 0);
     child.kill().expect("SIGKILL");
-    child.wait().expect("it is gone");
+    child.wait().expect("the process ended");
     drop(plant);
     assert_eq!(support::objects(&system.domain), [""; 0]);
 }
 
-/// A process that is killed between creating an object and setting its size leaves such objects.
+/// A process that is killed between creating an object and setting its size leaves an object of size zero.
 #[test]
-fn unsized_objects_block_nobody() {
+fn objects_of_size_zero_do_not_block_a_join() {
     let system = support::system("no-size");
     let plant = PlantLink::new(&system.domain).expect("a plant");
     let names = support::objects(&system.domain);
@@ -117,6 +119,6 @@ fn unsized_objects_block_nobody() {
     let domain = system.domain.clone();
     std::thread::spawn(move || sender.send(PlantLink::new(&domain).map(drop)));
     let joined = receiver.recv_timeout(Duration::from_secs(30));
-    joined.expect("it does not wait for ever").expect("a plant");
+    joined.expect("joining ends in time").expect("a plant");
     assert_eq!(support::objects(&system.domain), [""; 0]);
 }

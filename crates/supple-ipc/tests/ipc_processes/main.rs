@@ -1,5 +1,5 @@
-//! Several processes of one system. They start processes, which inherit file locks until they have started: the
-//! tests of the locks are another program.
+//! Tests with several processes of one system. A child process inherits file locks until it has started; the tests of the
+//! locks are therefore in another program.
 
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,4 +1,4 @@
-//! Shared memory is allocated at the start, and belongs to this user.
+//! Tests that shared memory is allocated at the start and belongs to this user.
 
 use crate::support::{objects, state, system};
 use std::fs::Permissions;
@@ -30,23 +30,23 @@ fn all_pages_are_allocated_at_the_start() {
     }
 }
 
-/// Removes a file that the test created in /dev/shm.
-struct Made(PathBuf);
+/// A file that the test created in /dev/shm; dropping this value removes the file.
+struct RemovedOnDrop(PathBuf);
 
-impl Drop for Made {
+impl Drop for RemovedOnDrop {
     fn drop(&mut self) {
         let _ = std::fs::remove_file(&self.0);
     }
 }
 
-/// Creates a file that belongs to another user; `None` without the permission to do so.
-fn of_another_user(name: &str, bytes: &[u8]) -> Option<Made> {
-    let file = Made(PathBuf::from(format!("/dev/shm/{name}")));
+/// Creates a file that belongs to another user; `None` if this user may not change the owner of a file.
+fn create_file_of_another_user(name: &str, bytes: &[u8]) -> Option<RemovedOnDrop> {
+    let file = RemovedOnDrop(PathBuf::from(format!("/dev/shm/{name}")));
     std::fs::write(&file.0, bytes).expect("written");
     match chown(&file.0, Some(65534), Some(65534)) {
         Ok(()) => Some(file),
         Err(error) => {
-            println!("skipped: no file can be given to another user: {error}");
+            println!("skipped: this user may not change the owner of a file: {error}");
             None
         }
     }
@@ -56,10 +56,10 @@ fn of_another_user(name: &str, bytes: &[u8]) -> Option<Made> {
 fn files_of_another_user_with_our_prefix_are_ignored_and_kept() {
     let system = system("squatted");
     let begin = system.domain.object_prefix();
-    let Some(empty) = of_another_user(&format!("{begin}not_ours"), b"") else {
+    let Some(empty) = create_file_of_another_user(&format!("{begin}not_ours"), b"") else {
         return;
     };
-    let full = of_another_user(&format!("{begin}nor_this"), b"nonsense");
+    let full = create_file_of_another_user(&format!("{begin}nor_this"), b"nonsense");
     let plant = PlantLink::new(&system.domain).expect("a plant");
     let controller = ControllerLink::new(&system.domain).expect("a controller");
     assert!(plant.publish(&state(0)).expect("published"));
@@ -71,7 +71,7 @@ fn files_of_another_user_with_our_prefix_are_ignored_and_kept() {
 /// Environment variable that gives a child process of this test its folder.
 const FOLDER: &str = "SUPPLE_TEST_SHARED_MEMORY_FOLDER";
 
-/// Not a test: a plant that runs as another user. Prints its shared-memory objects, or the error.
+/// A plant process that runs as another user and prints its shared-memory objects, or the error; not a test itself.
 #[test]
 #[ignore = "a process of the test below"]
 fn plant_process() {
@@ -83,7 +83,7 @@ fn plant_process() {
     }
 }
 
-/// Output of a plant of user 65534; `None` without the permission to start one.
+/// Runs a plant as user 65534 and returns its output; `None` if this user may not start processes of other users.
 fn plant_of_another_user(folder: &TempDir) -> Option<String> {
     let output = Command::new(std::env::current_exe().expect("this test"))
         .args([
@@ -104,14 +104,14 @@ fn plant_of_another_user(folder: &TempDir) -> Option<String> {
     line.map(str::to_owned)
 }
 
-/// Another user has created the objects that a service needs, accessible to all.
+/// Another user has created the objects that a service needs, and all users can access them.
 #[test]
 fn object_of_another_user_is_never_used() {
     let folder = tempfile::tempdir().expect("a folder");
     let owned = chown(folder.path(), Some(65534), Some(65534));
     let first = owned.ok().and_then(|()| plant_of_another_user(&folder));
     let Some(first) = first else {
-        println!("skipped: no process of another user can be started");
+        println!("skipped: this user may not start processes of other users");
         return;
     };
     let names: Vec<&str> = first
@@ -119,9 +119,9 @@ fn object_of_another_user_is_never_used() {
         .filter(|name| name.ends_with(".dynamic") || name.ends_with(".global_mgmt"))
         .collect();
     assert!(names.len() >= 3, "{first}");
-    let planted: Vec<Made> = names
+    let planted: Vec<RemovedOnDrop> = names
         .iter()
-        .map(|name| Made(PathBuf::from(format!("/dev/shm/{name}"))))
+        .map(|name| RemovedOnDrop(PathBuf::from(format!("/dev/shm/{name}"))))
         .collect();
     for file in &planted {
         std::fs::write(&file.0, [0; 4096]).expect("written");

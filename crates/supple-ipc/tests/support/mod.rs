@@ -1,6 +1,6 @@
-//! A separate system for each test.
+//! Creates a separate system for each test.
 
-#![allow(dead_code, reason = "each test binary uses its part")]
+#![allow(dead_code, reason = "each test program uses only some of these items")]
 
 use std::path::PathBuf;
 use supple_core::Input;
@@ -17,7 +17,7 @@ pub struct System {
     _guard: TempDir,
 }
 
-/// A new system under a prefix that no other test uses at the same time.
+/// Creates a system with a prefix that no other test uses at the same time.
 pub fn system(prefix: &str) -> System {
     let guard = tempfile::Builder::new()
         .permissions(std::os::unix::fs::PermissionsExt::from_mode(0o700))
@@ -31,7 +31,7 @@ pub fn system(prefix: &str) -> System {
     }
 }
 
-/// A state of the 4-joint arm at home.
+/// Returns a state of the 4-joint arm in its home pose.
 pub fn state(cycle: u64) -> ArmState {
     let home = Description::asset("wam4").expect("built in");
     let home = home.home::<4>().expect("four joints");
@@ -52,14 +52,14 @@ pub fn state(cycle: u64) -> ArmState {
     )
 }
 
-/// The first output of a controller of the 4-joint arm.
+/// Computes the first output of a controller of the 4-joint arm.
 pub fn answer(input: &Input<4>) -> Output<4> {
     let description = Description::asset("wam4").expect("built in");
     let controller = Controller::new(description.config().expect("valid")).expect("valid");
     step(&controller, &mut State::new(&controller), input)
 }
 
-/// The shared-memory objects of a system.
+/// Lists the shared-memory objects of a system.
 pub fn objects(domain: &Domain) -> Vec<String> {
     let names = std::fs::read_dir("/dev/shm").expect("shared memory");
     let names = names.map(|entry| entry.expect("an entry").file_name());

@@ -31,7 +31,7 @@ impl Property {
         (0..ids::NAMES.len() as u8).map(Property)
     }
 
-    /// Name of the property; the more common one of two.
+    /// Returns the name of the property, or the more common one if it has two names.
     pub fn name(self) -> &'static str {
         ids::NAMES[usize::from(self.0)]
     }
@@ -57,7 +57,7 @@ impl fmt::Display for Property {
 }
 
 impl PropertyId {
-    /// Id `number`; `None` above 127.
+    /// Creates the id `number`; `None` for a number above 127.
     pub const fn new(number: u8) -> Option<PropertyId> {
         if number & SET_BIT == 0 {
             Some(PropertyId(number))
@@ -94,7 +94,7 @@ impl Value {
         }
     }
 
-    /// `value` in `width`; `None` if it does not fit 16 bits.
+    /// Creates a value of this width; `None` if it does not fit into 16 bits.
     pub fn of_width(value: i32, width: Width) -> Option<Value> {
         match width {
             Width::Narrow => i16::try_from(value).ok().map(Value::Narrow),
@@ -103,7 +103,7 @@ impl Value {
     }
 }
 
-/// A request or an assignment.
+/// A property message: a request for a value, or a value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PropertyMessage {
     /// Requests a value.
@@ -115,15 +115,15 @@ pub enum PropertyMessage {
 /// Errors of parsing a property message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PropertyError {
-    /// A payload of neither one, four nor six bytes.
+    /// The payload has neither one, four nor six bytes.
     Length(LengthError),
-    /// A single byte with the set bit.
+    /// The message is a single byte with the set bit.
     SetWithoutValue(u8),
-    /// A value after a byte without the set bit.
+    /// A value follows a byte without the set bit.
     GetWithValue(u8),
-    /// A second byte that is not zero.
+    /// The second byte is not zero.
     Padding(u8),
-    /// A request where a reply was expected; the property's id.
+    /// The message is a request for the property of this id, but a reply was expected.
     NotAReply(PropertyId),
 }
 
@@ -153,7 +153,7 @@ impl fmt::Display for PropertyError {
 impl core::error::Error for PropertyError {}
 
 impl PropertyMessage {
-    /// Parses a property message; sender and destination are not checked.
+    /// Parses a property message. Does not check sender and destination.
     ///
     /// # Errors
     /// See [`PropertyError`].
@@ -199,8 +199,8 @@ pub fn get(to: impl Into<Destination>, property: PropertyId) -> CanFrame {
     PropertyMessage::Get(property).emit(NodeId::HOST, to.into())
 }
 
-/// Encodes the host's setting of a property. Pucks do not answer; read [`Property::STAT`] to check that it was
-/// processed.
+/// Encodes the frame with which the host sets a property. Pucks do not answer it; read [`Property::STAT`] to check that the
+/// puck has processed it.
 pub fn set(to: impl Into<Destination>, property: PropertyId, value: Value) -> CanFrame {
     PropertyMessage::Set(property, value).emit(NodeId::HOST, to.into())
 }
@@ -215,7 +215,7 @@ pub struct Reply {
 }
 
 impl Reply {
-    /// Parses a frame to [`GroupId::REPLY`]; sender and destination are not checked.
+    /// Parses a frame to [`GroupId::REPLY`]. Does not check sender and destination.
     ///
     /// # Errors
     /// See [`PropertyError`]; a request is also an error.
@@ -226,7 +226,7 @@ impl Reply {
         }
     }
 
-    /// The frame that node `from` sends.
+    /// Encodes the frame that node `from` sends.
     pub const fn emit(&self, from: NodeId) -> CanFrame {
         let message = PropertyMessage::Set(self.property, self.value);
         message.emit(from, Destination::Group(GroupId::REPLY))

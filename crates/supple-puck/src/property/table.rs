@@ -50,11 +50,11 @@ impl core::error::Error for FirmwareTooOld {}
 /// Meaning of an id.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Slot {
-    /// A property.
+    /// The id belongs to this property.
     Property(Property),
-    /// The upper half of the 32-bit property before it.
+    /// The id is the upper half of the 32-bit property before it.
     PlaceHolder(Property),
-    /// No property.
+    /// The id belongs to no property.
     Unused,
 }
 
@@ -76,10 +76,10 @@ impl PropertyTable {
         column: FORCE_TORQUE_COLUMN,
     };
 
-    /// Ids of a puck whose [`Property::VERS`] is `version`. Newer versions use the newest list.
+    /// Returns the ids of a puck whose [`Property::VERS`] is `version`. Versions newer than all lists use the newest list.
     ///
     /// # Errors
-    /// A motor puck or safety module older than version 32.
+    /// [`FirmwareTooOld`] for a motor puck or safety module older than version 32.
     pub fn of_firmware(kind: PuckKind, version: i32) -> Result<PropertyTable, FirmwareTooOld> {
         let column = match kind {
             PuckKind::ForceTorque => FORCE_TORQUE_COLUMN,

@@ -1,15 +1,15 @@
-//! Limits that the safety module monitors. It resets them at power-up.
+//! Limits that the safety module monitors, and resets at power-up.
 
 use crate::property::{Property, Value};
 use crate::torque::PuckTorque;
 use core::fmt;
 
-/// A Cartesian speed in Q4.12 m/s, 1/4096 to 7.9998 m/s: of the elbow, 550 mm from the shoulder, and of
-/// the point 350 mm beyond it.
+/// Limit of a Cartesian speed in Q4.12 m/s, 1/4096 to 7.9998 m/s. It applies to the elbow, 550 mm from the shoulder, and to
+/// the point 350 mm beyond the elbow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct SpeedLimit(i16);
 
-/// A speed that is not a valid limit of the safety module \[m/s\].
+/// Error: the speed is not a valid limit of the safety module \[m/s\].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpeedLimitError(pub f64);
 
@@ -28,11 +28,11 @@ impl core::error::Error for SpeedLimitError {}
 impl SpeedLimit {
     const PER_M_PER_S: f64 = 4096.0;
 
-    /// The largest representable limit not above `speed_m_per_s`. Values below 1/4096 m/s are an error instead
+    /// Returns the largest representable limit that is not above `speed_m_per_s`. Values below 1/4096 m/s are an error instead
     /// of being rounded to 0, because 0 means "no limit".
     ///
     /// # Errors
-    /// A value outside the range from 1/4096 to just below 8.
+    /// [`SpeedLimitError`] for a value outside the range from 1/4096 to just below 8.
     pub fn from_m_per_s(speed_m_per_s: f64) -> Result<SpeedLimit, SpeedLimitError> {
         let raw = libm::floor(speed_m_per_s * SpeedLimit::PER_M_PER_S);
         if (1.0..=f64::from(i16::MAX)).contains(&raw) {
@@ -42,10 +42,10 @@ impl SpeedLimit {
         }
     }
 
-    /// From the value of [`Property::VL1`] or [`Property::VL2`]; `Ok(None)` means no limit.
+    /// Converts the value of [`Property::VL1`] or [`Property::VL2`]; `Ok(None)` means no limit.
     ///
     /// # Errors
-    /// A value that is negative or outside 16 bits; the error contains the corresponding speed.
+    /// [`SpeedLimitError`] with the corresponding speed for a value that is negative or does not fit into 16 bits.
     pub fn from_value(value: i32) -> Result<Option<SpeedLimit>, SpeedLimitError> {
         match i16::try_from(value) {
             Ok(0) => Ok(None),
@@ -65,21 +65,21 @@ impl SpeedLimit {
     }
 }
 
-/// The four limits. The defaults are those of the module according to libbarrett: 0.5 and 1 m/s, 4731 and 5204
+/// The four limits of the safety module. The defaults are those of the module according to libbarrett: 0.5 and 1 m/s, 4731 and 5204
 /// units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SafetyLimits {
-    /// VL1: above it the pendant warns. `None`: no warning.
+    /// VL1: speed above which the pendant warns; `None` for no warning.
     pub speed_warning: Option<SpeedLimit>,
-    /// VL2: above it the module goes to idle. `None`: never.
+    /// VL2: speed above which the module enters idle; `None` for no limit.
     pub speed_fault: Option<SpeedLimit>,
     /// TL1: commanded torque of any motor above which the pendant warns. Not negative.
     pub torque_warning: PuckTorque,
-    /// TL2: commanded torque of any motor above which the module goes to idle. Not negative.
+    /// TL2: commanded torque of any motor above which the module enters idle. Not negative.
     pub torque_fault: PuckTorque,
 }
 
-/// Inconsistent limits.
+/// Error: the limits are inconsistent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SafetyLimitsError {
     /// The speed warning limit is above the fault limit.
@@ -133,7 +133,7 @@ impl SafetyLimits {
     /// Rejects inconsistent limits.
     ///
     /// # Errors
-    /// A warning limit above its fault limit, or a negative torque.
+    /// [`SafetyLimitsError`] for a warning limit above its fault limit, or a negative torque.
     pub fn validate(&self) -> Result<(), SafetyLimitsError> {
         for torque in [self.torque_warning, self.torque_fault] {
             if torque < PuckTorque::ZERO {
@@ -154,7 +154,7 @@ impl SafetyLimits {
         }
     }
 
-    /// Properties and values to set, at least 10 ms apart.
+    /// Returns the properties and values to set, at intervals of at least 10 ms.
     pub fn settings(&self) -> [(Property, Value); 4] {
         let speed = |limit: Option<SpeedLimit>| limit.map_or(0, SpeedLimit::value);
         [

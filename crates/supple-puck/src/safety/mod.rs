@@ -1,7 +1,8 @@
 //! The safety module: its mode, its limits, and the pendant's lights and buttons.
 //!
-//! It monitors torque commands and position replies, and ends torque mode on excess torque, speed or voltage or
-//! when positions stop. The host may lower its mode but never raise it: that requires a person at the pendant.
+//! The safety module monitors torque commands and position replies. It ends torque mode if a torque, a speed or the voltage
+//! exceeds its limit, or if position replies stop. The host can lower the mode of the module but never raise it; that
+//! requires a person who presses the pendant.
 //! Source: libbarrett, btclient, OWD, manual page 48.
 
 mod limits;
@@ -24,10 +25,10 @@ pub enum SafetyMode {
 }
 
 impl SafetyMode {
-    /// From the property's value.
+    /// Converts the property's value.
     ///
     /// # Errors
-    /// Not 0, 1 or 2.
+    /// [`UnknownValue`] for a value other than 0, 1 or 2.
     pub const fn from_value(value: i32) -> Result<SafetyMode, UnknownValue> {
         match value {
             0 => Ok(SafetyMode::EStop),
@@ -46,7 +47,7 @@ impl SafetyMode {
         self as i16
     }
 
-    /// The mode after the host requests `requested`: lower modes are accepted, higher ones ignored.
+    /// Returns the mode after the host has requested `requested`: the module accepts a lower mode and ignores a higher one.
     pub fn after_request(self, requested: SafetyMode) -> SafetyMode {
         self.min(requested)
     }

@@ -1,4 +1,4 @@
-//! The pendant word, [`Property::PEN`](crate::Property::PEN).
+//! The pendant word: the value of [`Property::PEN`](crate::Property::PEN).
 //!
 //! ```text
 //! 27..26 button   25 activate light   24 idle light   23..16 seven segments
@@ -23,7 +23,7 @@ impl PenWord {
     /// The bits that have a meaning.
     pub const MASK: u32 = 0x0fff_7fff;
 
-    /// From the property's value, whose sign has no meaning.
+    /// Converts the property's value, whose sign has no meaning.
     pub const fn from_value(value: i32) -> PenWord {
         PenWord(value as u32)
     }
@@ -47,7 +47,7 @@ pub enum Button {
     Activate = 0b01,
     /// Idle.
     Idle = 0b10,
-    /// None.
+    /// No button.
     None = 0b11,
 }
 
@@ -82,7 +82,7 @@ impl SevenSegment {
         (0x38, 'L'),
     ];
 
-    /// The character shown; `None` if it is not one of `0` to `7`, `A`, `E`, `H`, `L`.
+    /// Returns the character that the digit shows; `None` if it is not one of `0` to `7`, `A`, `E`, `H`, `L`.
     pub fn character(self) -> Option<char> {
         let digit = SevenSegment::DIGITS
             .iter()
@@ -90,7 +90,7 @@ impl SevenSegment {
         digit.map(|&(_, character)| character)
     }
 
-    /// The segments of a character; `None` if it is not one of `0` to `7`, `A`, `E`, `H`, `L`.
+    /// Returns the segments of a character; `None` if it is not one of `0` to `7`, `A`, `E`, `H`, `L`.
     pub fn of(character: char) -> Option<SevenSegment> {
         let digit = SevenSegment::DIGITS.iter().find(|(_, c)| *c == character);
         digit.map(|&(bits, _)| SevenSegment(bits))
@@ -106,7 +106,7 @@ pub struct Pendant {
     pub activate_light: bool,
     /// Light of the idle button.
     pub idle_light: bool,
-    /// Digit shown.
+    /// Seven-segment digit.
     pub segments: SevenSegment,
     /// Speed of the arm relative to VL1 and VL2.
     pub velocity: Level,
@@ -142,10 +142,10 @@ impl fmt::Display for PendantError {
 impl core::error::Error for PendantError {}
 
 impl Pendant {
-    /// Parses a word; bits without a meaning are ignored.
+    /// Parses a word; ignores bits without a meaning.
     ///
     /// # Errors
-    /// The first field, from velocity on, that is not one-hot.
+    /// [`PendantError`] with the first field, starting with velocity, that does not have exactly one bit set.
     pub fn parse(word: PenWord) -> Result<Pendant, PendantError> {
         let level = |index: u32| match word.field(index) {
             0b001 => Ok(Level::Safe),

@@ -1,5 +1,4 @@
-//! Round trips: encoded values parse to themselves, and every input is either rejected or re-encoded
-//! identically.
+//! Round-trip tests: encoded values parse to themselves, and every input is either rejected or re-encoded identically.
 
 use crate::property::config;
 use proptest::prelude::*;
@@ -26,7 +25,7 @@ fn every_22_bit_position_round_trips() {
     assert!(Counts::new(Counts::MIN.get() - 1).is_err());
 }
 
-/// All 16384 patterns in all four slots, next to other values that must not leak.
+/// Tests all 16384 patterns in all four slots; a pattern must not change the values in the other slots.
 #[test]
 fn every_14_bit_torque_round_trips() {
     for pattern in 0..1u64 << 14 {
@@ -81,7 +80,7 @@ fn seven_segment_digits_round_trip() {
     assert_eq!(SevenSegment::of('P'), None);
 }
 
-/// Any frame the bus can carry: all ids, all lengths, all bytes.
+/// Generates any classic frame: all ids, all lengths, all bytes.
 fn any_frame() -> impl Strategy<Value = CanFrame> {
     (0..0x800u32, proptest::collection::vec(any::<u8>(), 0..=8))
         .prop_map(|(id, payload)| CanFrame::from_raw(id, &payload).unwrap())

@@ -1,4 +1,4 @@
-//! The protocol of the arm's bus.
+//! Tests of Barrett's puck protocol.
 
 #[path = "../../../../tests/support/property.rs"]
 mod property;

@@ -48,7 +48,7 @@ fn assert_same(table: PropertyTable, list: &BTreeMap<String, u8>, context: &str)
     }
 }
 
-/// Each list at the first and last version for which it is valid.
+/// Tests each list at the first and the last version for which it is valid.
 #[test]
 fn every_list_matches_the_published_one() {
     let lists = lists();
@@ -74,7 +74,7 @@ fn the_first_ids_of_the_monitor_are_valid_in_every_firmware() {
 }
 
 #[test]
-fn ids_map_back_to_their_properties() {
+fn property_to_id_and_back_is_the_identity() {
     for ((kind, version), _) in lists() {
         let table = table(&kind, version);
         for property in Property::all() {
@@ -96,7 +96,7 @@ fn ids_map_back_to_their_properties() {
     );
 }
 
-/// Widths of the newest firmware, as documented.
+/// Compares the widths in the newest firmware with the documentation.
 #[test]
 fn thirty_two_bit_properties_match_the_documentation() {
     let wide_in = |kind, version| -> BTreeSet<&str> {
@@ -115,7 +115,7 @@ fn thirty_two_bit_properties_match_the_documentation() {
 }
 
 #[test]
-fn names_are_unique_and_map_back() {
+fn names_are_unique_and_identify_their_properties() {
     for property in Property::all() {
         assert_eq!(Property::from_name(property.name()), Some(property));
     }

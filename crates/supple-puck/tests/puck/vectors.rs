@@ -21,7 +21,7 @@ fn id(number: u8) -> PropertyId {
 }
 
 #[test]
-fn message_ids() {
+fn message_ids_equal_hand_encoded_ids() {
     let finger = NodeId::hand(1).unwrap();
     let group = MessageId::to_group;
     for (found, expected) in [
@@ -53,7 +53,7 @@ fn message_ids() {
 }
 
 #[test]
-fn frames_carry_eight_bytes() {
+fn frames_of_more_than_eight_bytes_are_rejected() {
     let error = CanFrame::from_raw(1, &[0; 9]).unwrap_err();
     assert_eq!(
         error.to_string(),
@@ -63,7 +63,7 @@ fn frames_carry_eight_bytes() {
 }
 
 #[test]
-fn positions() {
+fn positions_equal_hand_encoded_frames() {
     for (counts, bytes) in [
         (0, [0x00, 0x00, 0x00]),
         (1, [0x00, 0x00, 0x01]),
@@ -92,7 +92,7 @@ fn positions() {
 }
 
 #[test]
-fn torques() {
+fn torques_equal_hand_encoded_frames() {
     for (units, bytes) in [
         (
             [1, 2, 3, 4],
@@ -131,7 +131,7 @@ fn torques() {
 }
 
 #[test]
-fn property_messages() {
+fn property_messages_equal_hand_encoded_frames() {
     let p = PropertyTable::of_firmware(PuckKind::Motor, 175)
         .unwrap()
         .id(Property::P)
@@ -165,7 +165,7 @@ fn property_messages() {
 }
 
 #[test]
-fn force_torque_frames() {
+fn force_torque_frames_equal_hand_encoded_frames() {
     assert_eq!(force_torque::request(), frame(0x008, &[54]));
     assert_eq!(force_torque::request_acceleration(), frame(0x008, &[64]));
     assert_eq!(force_torque::tare(), frame(0x008, &[0xb6, 0, 0, 0, 0, 0]));
@@ -190,7 +190,7 @@ fn force_torque_frames() {
 
 /// Idle, all levels safe except a voltage warning: button 11, idle light, '1', fields 001 001 010 001 001.
 #[test]
-fn pendant_word() {
+fn the_pendant_word_equals_the_hand_encoded_word() {
     let word = PenWord(0x0d06_0000 | 0b001_001_010_001_001);
     let pendant = Pendant {
         button: Button::None,
@@ -248,7 +248,7 @@ fn inbound_frames_are_distinguished_by_group() {
 }
 
 #[test]
-fn cycles_fit_as_computed_by_hand() {
+fn cycle_durations_equal_those_computed_by_hand() {
     for (dlc, min, max) in [
         (1, 55, 65),
         (3, 71, 85),

@@ -1,4 +1,4 @@
-//! An axis: quantity with unit, range and round ticks, for the drawing library.
+//! An axis for the drawing library: quantity with unit, range and round ticks.
 
 use super::ticks::{Ticks, number};
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
@@ -14,13 +14,13 @@ pub struct Axis<'a> {
 }
 
 impl<'a> Axis<'a> {
-    /// Axis from the first tick to the last.
+    /// Creates an axis from the first tick to the last.
     pub fn new(label: &'a str, ticks: Ticks) -> Axis<'a> {
         let range = ticks.range();
         Axis::bounded(label, ticks, range)
     }
 
-    /// Axis over a given range; ticks outside it are omitted.
+    /// Creates an axis over a given range; ticks outside the range are omitted.
     pub fn bounded(label: &'a str, ticks: Ticks, range: Range<f64>) -> Axis<'a> {
         let inside = |at: &f64| range.start <= *at && *at <= range.end;
         let ticks = Ticks {
@@ -37,7 +37,7 @@ impl<'a> Axis<'a> {
         }
     }
 
-    /// Logarithmic axis over a range above zero; ticks at 1, 2 and 5 of each decade.
+    /// Creates a logarithmic axis over a range above zero, with ticks at 1, 2 and 5 of each decade.
     pub fn logarithmic(label: &'a str, range: Range<f64>) -> Axis<'a> {
         let first = range.start.log10().floor() as i32;
         let last = range.end.log10().ceil() as i32;
@@ -85,7 +85,7 @@ impl Ranged for Scale {
     }
 
     fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        // No minor grid lines.
+        // The axis has no minor grid lines.
         if hint.weight().allow_light_points() {
             return Vec::new();
         }

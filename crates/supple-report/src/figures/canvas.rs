@@ -39,7 +39,7 @@ pub(super) fn draw_canvas(
         draw(&area)?;
         area.present()?;
     }
-    // Scaled down for display, with a text alternative for accessibility.
+    // The figure is scaled down for display and has an alternative text for accessibility.
     let (_, rest) = svg.split_once("viewBox=").unwrap_or(("", &svg));
     let (tag, rest) = rest.split_once('>').unwrap_or((rest, ""));
     let alt_text = escape(alt_text);
@@ -54,7 +54,7 @@ pub(super) fn escape(text: &str) -> String {
         .replace('>', "&gt;")
 }
 
-/// Metres as millimetres.
+/// Converts metres to millimetres.
 pub(super) fn mm(metres: f64) -> f64 {
     1e3 * metres
 }

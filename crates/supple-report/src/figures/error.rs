@@ -1,9 +1,9 @@
-//! Why a figure cannot be drawn.
+//! Errors of drawing a figure.
 
 use plotters::drawing::DrawingAreaErrorKind;
 use supple_cli::exit::Failure;
 
-/// Why a figure cannot be drawn.
+/// Error: a figure cannot be drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum FigureError {
     /// The drawing library reported an error.

@@ -31,7 +31,7 @@ pub struct QuadrantRun<'a> {
     pub samples: &'a [Sample],
 }
 
-/// The runs of a demo.
+/// Collects the runs of a demo.
 pub fn quadrant_runs(demo: &Demo) -> Vec<QuadrantRun<'_>> {
     let runs = quadrants_with_models(&demo.summary)
         .into_iter()
@@ -67,7 +67,7 @@ pub fn draw(quadrant_runs: &[QuadrantRun<'_>]) -> Result<String, FigureError> {
 }
 
 fn draw_path(area: &super::panel::Area<'_>, run: &QuadrantRun<'_>) -> Result<(), FigureError> {
-    // Horizontal coordinate along the first semi-axis: x where the paper has the path.
+    // The horizontal coordinate is along the first semi-axis, which is x for the paper's path.
     let along = run.quadrant.first_m();
     let along = along / along.norm();
     let seen = move |point: &[f64; 3]| (along.x * point[0] + along.y * point[1], point[2]);
@@ -102,7 +102,7 @@ fn draw_path(area: &super::panel::Area<'_>, run: &QuadrantRun<'_>) -> Result<(),
     panel.line(run.samples.iter().map(|s| seen(&s.tip_m)), BLUE, 1.4)
 }
 
-/// Widens both ranges to axis ranges that have the same scale (metres per pixel).
+/// Widens both ranges so that both axes have the same scale (metres per pixel).
 fn same_scale(x: Range<f64>, z: Range<f64>, axes_px: (f64, f64)) -> (Range<f64>, Range<f64>) {
     let size = |r: &Range<f64>| (1.0 + 2.0 * MARGIN) * (r.end - r.start);
     let m_per_px = (size(&x) / axes_px.0).max(size(&z) / axes_px.1);

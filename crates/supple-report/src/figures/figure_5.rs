@@ -9,7 +9,7 @@ use super::ticks::{Ticks, extent};
 use plotters::style::RGBColor;
 use supple_experiment::{Demo, Sample};
 
-/// Force that counts as touch, well above the noise of the sensor \[N\].
+/// Force above which the tip counts as touching, well above the noise of the sensor \[N\].
 const TOUCH_N: f64 = 0.5;
 /// Time shown before the first touch \[s\].
 const BEFORE_S: f64 = 0.25;
@@ -49,7 +49,7 @@ impl Probing {
     }
 }
 
-/// The probing runs at the stiffnesses of the paper's figure.
+/// Collects the probing runs at the stiffnesses of the paper's figure.
 pub fn probings(demo: &Demo) -> Vec<Probing> {
     let shown = demo
         .probing
@@ -171,7 +171,7 @@ mod tests {
     use super::*;
     use supple_experiment::JointTorque;
 
-    /// Two strokes of 2 s down and up; the first touches at 0.5 s, the second does not touch.
+    /// Returns two strokes of 2 s down and up; the first touches at 0.5 s, the second does not touch.
     fn samples() -> Vec<Sample> {
         let sample = |k: u32| {
             let time_s = f64::from(k) * 1e-3;
@@ -195,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn strokes_are_cut_where_the_reference_turns_down_and_aligned_at_the_touch() {
+    fn strokes_begin_where_the_reference_turns_down_and_are_aligned_at_the_touch() {
         let probing = Probing::new(5.0, &samples());
         let [contact] = probing.contacts.as_slice() else {
             panic!("one stroke touched: {}", probing.contacts.len());

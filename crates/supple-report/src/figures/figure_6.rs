@@ -27,9 +27,9 @@ pub struct Series {
 
 /// Impulses with the fade of the friction feed-forward on and off.
 pub struct Impulses {
-    /// On.
+    /// Impulses with the fade on.
     pub fade_on: Series,
-    /// Off.
+    /// Impulses with the fade off.
     pub fade_off: Series,
 }
 
@@ -157,7 +157,7 @@ fn line_and_marks(
     {
         let start = scenario::STIFFNESS_N_PER_M;
         let end = extent(series.whole.iter().map(|p| p.0)).end;
-        // Short steps, because a panel omits points beyond its range. The line ends where its points do.
+        // The line consists of short steps, because a panel omits points beyond its range. It ends at the outermost points.
         let steps = (0..=100).map(|k| start + (end - start) * f64::from(k) / 100.0);
         panel.line(steps.map(|k| (k, intercept + slope * k)), colour, 1.4)?;
     }
@@ -168,7 +168,7 @@ fn line_and_marks(
 mod tests {
     use super::*;
 
-    /// Centres of the filled discs of a colour, without the legend.
+    /// Returns the centres of the filled discs of a colour, without the legend.
     fn discs(svg: &str, colour: &str) -> Vec<(f64, f64)> {
         let document = roxmltree::Document::parse(svg).expect("XML");
         let number = |node: &roxmltree::Node<'_, '_>, name| -> f64 {
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn points_stand_where_the_data_say() {
+    fn marks_are_drawn_at_the_positions_of_the_data() {
         let stiffnesses = [0.5, 5.0, 25.0, 50.0, 75.0, 100.0, 125.0];
         let series = |intercept: f64| {
             let whole: Vec<_> = stiffnesses.map(|k| (k, intercept + 0.02 * k)).into();
@@ -203,7 +203,7 @@ mod tests {
         let all = &places[..stiffnesses.len()];
         let near_zero = &places[stiffnesses.len()..];
         assert_eq!(near_zero.len(), 3, "0.5, 5 and 25 N/m");
-        // Both axes are linear: each step is in proportion to that of the data, to a pixel.
+        // Both axes are linear: distances of the marks are proportional to those of the data, within a pixel.
         let [first, .., last] = all else { panic!() };
         for (k, (x, y)) in stiffnesses.iter().zip(all) {
             let share = (k - 0.5) / 124.5;
@@ -216,7 +216,7 @@ mod tests {
                 "{k}"
             );
         }
-        assert!(last.1 < first.1, "more is higher");
+        assert!(last.1 < first.1, "a larger value is higher in the figure");
         assert!(svg.contains("fade on: 0.20 + 0.0200 K"));
     }
 

@@ -10,7 +10,7 @@ use plotters::style::RGBColor;
 
 /// Width of the canvas and height of a panel \[px\].
 const SIZE_PX: (u32, u32) = (760, 190);
-/// Longest curve that is drawn point by point; of a longer one each pair of points has the extremes of an interval.
+/// Maximum number of points of a curve. In a longer curve, each pair of points is the minimum and maximum of an interval.
 const MAX_POINTS: usize = 4000;
 
 /// Points of a curve: time \[s\] and value.
@@ -42,7 +42,7 @@ pub struct LogPanel {
     pub marked_s: Vec<f64>,
 }
 
-/// Draws panels below one another, over the same time.
+/// Draws panels below one another with the same time axis.
 ///
 /// # Errors
 /// [`FigureError::Draw`].
@@ -94,7 +94,7 @@ fn stroke_of(index: usize, wide_first: bool) -> (RGBColor, f64) {
     }
 }
 
-/// The smallest and the largest value of each of equal numbers of points, in their order.
+/// Thins a curve out: divides it into intervals of equal numbers of points, and keeps minimum and maximum of each, in order.
 fn thinned(points: &[(f64, f64)]) -> Points {
     let size = points.len().div_ceil(MAX_POINTS / 2);
     if size <= 2 {
@@ -119,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_long_curve_keeps_its_peaks_and_its_order() {
+    fn thinning_keeps_peaks_and_order() {
         let mut points: Points = (0..100_000).map(|k| (f64::from(k), 0.0)).collect();
         points[12_345].1 = 7.0;
         points[54_321].1 = -3.0;

@@ -1,14 +1,15 @@
-//! Text of an SVG as outlines of an embedded font, so that a bitmap does not depend on installed fonts. Labels need only
-//! glyphs side by side; a library that lays out text takes longer to compile than everything else that draws.
+//! Converts text of an SVG to outlines of an embedded font, so that a bitmap does not depend on installed fonts. This module
+//! only places glyphs side by side, because a text layout library would take longer to compile than all other drawing code.
 
 use resvg::usvg::roxmltree::{Document, Node};
 use std::fmt::Write as _;
 use ttf_parser::{Face, GlyphId, OutlineBuilder};
 
-/// Replaces each `<text>` by a `<path>`: glyphs side by side, without kerning. A box stands for a character that the font lacks.
+/// Replaces each `<text>` by a `<path>` of glyphs side by side, without kerning. A character that the font lacks becomes a
+/// box.
 ///
 /// # Errors
-/// What is wrong with the document, in words.
+/// The problem of the document, as text.
 pub fn outline_text(svg: &str) -> Result<String, String> {
     let face = Face::parse(dejavu::sans::regular(), 0).map_err(|error| error.to_string())?;
     let document = Document::parse(svg).map_err(|error| error.to_string())?;
@@ -27,7 +28,7 @@ pub fn outline_text(svg: &str) -> Result<String, String> {
     Ok(outlined)
 }
 
-/// One text as a path.
+/// Converts one text to a path.
 fn outline(face: &Face<'_>, node: Node<'_, '_>) -> Result<String, String> {
     let attribute = |name| {
         node.attribute(name)
@@ -65,7 +66,7 @@ fn outline(face: &Face<'_>, node: Node<'_, '_>) -> Result<String, String> {
     ))
 }
 
-/// Shift of the base line; an ex is half the size of the font.
+/// Returns the shift of the base line; an ex is half the font size.
 fn offset(dy: &str, size: f64) -> Result<f64, String> {
     let units = [("em", 1.0), ("ex", 0.5)];
     units
@@ -80,7 +81,7 @@ fn offset(dy: &str, size: f64) -> Result<f64, String> {
 /// Outlines in units of the font, y upwards.
 #[derive(Default)]
 struct Glyphs {
-    /// Where the next glyph begins.
+    /// Position of the next glyph.
     pen: f64,
     path: String,
 }
@@ -89,7 +90,7 @@ impl Glyphs {
     fn command(&mut self, name: char, points: &[(f32, f32)]) {
         self.path.push(name);
         for &(x, y) in points {
-            // Writing to a text does not fail.
+            // Writing to a string does not fail.
             let _ = write!(self.path, " {} {y}", self.pen + f64::from(x));
         }
     }
@@ -127,7 +128,7 @@ mod tests {
             "<svg width=\"100\" height=\"100\" xmlns=\"http://www.w3.org/2000/svg\">\n<text font-size=\"10\" \
              fill=\"#000000\" {attributes}>\n{text}\n</text>\n</svg>"
         );
-        let outlined = outline_text(&svg).expect("it can be outlined");
+        let outlined = outline_text(&svg).expect("the text can be outlined");
         assert!(!outlined.contains("<text"), "{outlined}");
         let tree = Tree::from_str(&outlined, &Options::default()).expect("an SVG");
         let Some(Node::Group(group)) = tree.root().children().first() else {
@@ -140,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn text_stands_where_its_anchor_says() {
+    fn text_is_placed_according_to_its_anchor() {
         let at = |anchor: &str| {
             bounds(
                 &format!("x=\"50\" y=\"60\" dy=\"0.5ex\" text-anchor=\"{anchor}\""),
@@ -161,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn a_turned_text_runs_upwards() {
+    fn a_rotated_text_runs_upwards() {
         let upright = bounds(
             "x=\"50\" y=\"60\" dy=\"0em\" text-anchor=\"start\"",
             "force",
@@ -178,14 +179,14 @@ mod tests {
     }
 
     #[test]
-    fn a_box_stands_for_a_character_that_the_font_lacks() {
+    fn a_character_that_the_font_lacks_becomes_a_box() {
         let at = "x=\"50\" y=\"60\" dy=\"0em\" text-anchor=\"start\"";
         let shown = bounds(at, "\u{10FFFF}");
         assert!(shown.width() > 3.0 && shown.height() > 5.0, "{shown:?}");
     }
 
     #[test]
-    fn what_cannot_be_drawn_is_named() {
+    fn the_error_names_the_invalid_attribute() {
         let error = |attributes: &str, text: &str| {
             outline_text(&format!("<svg><text {attributes}>{text}</text></svg>"))
                 .expect_err("an error")

@@ -19,18 +19,18 @@ const EDGE_PX: f64 = 4.0;
 /// Margins around the axes \[px\].
 #[derive(Clone, Copy, Debug)]
 pub struct Margins {
-    /// Above.
+    /// Margin above the axes.
     pub top: f64,
-    /// To the right.
+    /// Margin to the right.
     pub right: f64,
-    /// Below, for the labels of x.
+    /// Margin below, for the labels of x.
     pub bottom: f64,
-    /// To the left, for the labels of y.
+    /// Margin to the left, for the labels of y.
     pub left: f64,
 }
 
 impl Margins {
-    /// Size of the axes on an area of the given size \[px\].
+    /// Returns the size of the axes on an area of the given size \[px\].
     pub fn axes_px(&self, width_px: f64, height_px: f64) -> (f64, f64) {
         (
             width_px - EDGE_PX - self.left - self.right,

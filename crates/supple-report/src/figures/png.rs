@@ -21,9 +21,9 @@ pub fn render(name: &str, svg: &str) -> Result<Vec<u8>, FigureError> {
         .size()
         .to_int_size()
         .scale_by(PIXEL_RATIO)
-        .ok_or_else(|| failed("it has no size".to_owned()))?;
+        .ok_or_else(|| failed("the figure has no size".to_owned()))?;
     let mut pixmap = Pixmap::new(size.width(), size.height())
-        .ok_or_else(|| failed("it is too large".to_owned()))?;
+        .ok_or_else(|| failed("the figure is too large".to_owned()))?;
     resvg::render(
         &tree,
         Transform::from_scale(PIXEL_RATIO, PIXEL_RATIO),
@@ -44,7 +44,7 @@ mod tests {
         let svg = "<svg width=\"60\" height=\"20\" viewBox=\"0 0 60 20\" xmlns=\"http://www.w3.org/2000/svg\"><rect width=\"60\" \
                    height=\"20\" fill=\"#FFFFFF\"/><text x=\"30\" y=\"15\" dy=\"0em\" text-anchor=\"middle\" font-size=\"12\" \
                    fill=\"#000000\">error [mm]</text></svg>";
-        let png = render("text", svg).expect("it is rendered");
+        let png = render("text", svg).expect("the figure is rendered");
         let bitmap = Pixmap::decode_png(&png).expect("a PNG");
         assert_eq!((bitmap.width(), bitmap.height()), (120, 40));
         let dark = bitmap.pixels().iter().filter(|p| p.red() < 0x40).count();

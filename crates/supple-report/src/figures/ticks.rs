@@ -12,7 +12,7 @@ pub struct Ticks {
 }
 
 impl Ticks {
-    /// About `count` round ticks that enclose the values; at least two.
+    /// Returns about `count` round ticks that enclose the values, at least two.
     pub fn around(range: Range<f64>, count: usize) -> Ticks {
         let size = range.start.abs().max(range.end.abs());
         let span = range.end - range.start;
@@ -22,9 +22,9 @@ impl Ticks {
         Ticks::stepped(range, round_up(span / count as f64))
     }
 
-    /// Multiples of `step` that enclose the values.
+    /// Returns multiples of `step` that enclose the values.
     pub fn stepped(range: Range<f64>, step: f64) -> Ticks {
-        // Treat a bound that differs from a tick only by rounding as that tick.
+        // A bound that differs from a tick only by rounding counts as the tick.
         const SLACK: f64 = 1e-9;
         let first = (range.start / step + SLACK).floor();
         let last = (range.end / step - SLACK).ceil().max(first + 1.0);
@@ -59,7 +59,7 @@ pub fn number(value: f64, decimals: usize) -> String {
     }
 }
 
-/// Smallest number of the form 1, 2, 2.5 or 5 times a power of ten that is not below the argument.
+/// Returns the smallest number of the form 1, 2, 2.5 or 5 times a power of ten that is not below `value`.
 fn round_up(value: f64) -> f64 {
     let power = 10.0_f64.powf(value.log10().floor());
     let mantissa = value / power;
@@ -80,7 +80,7 @@ fn decimals(step: f64) -> usize {
         .unwrap_or(9)
 }
 
-/// Minimum and maximum of the finite values; 0..1 if there are none.
+/// Returns minimum and maximum of the finite values, or 0..1 if there are none.
 pub fn extent(values: impl IntoIterator<Item = f64>) -> Range<f64> {
     let mut range: Option<Range<f64>> = None;
     for value in values.into_iter().filter(|value| value.is_finite()) {
@@ -106,7 +106,7 @@ mod tests {
     }
 
     #[test]
-    fn a_single_value_still_gives_an_axis() {
+    fn a_single_value_gives_an_axis_of_nonzero_length() {
         let ticks = Ticks::around(3.0..3.0, 5);
         assert!(
             ticks.at.len() >= 2 && ticks.range().contains(&3.0),
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn zero_has_no_sign() {
+    fn a_number_that_rounds_to_zero_has_no_sign() {
         assert_eq!(Ticks::around(-1.0..1.0, 4).label(-0.0), "0");
     }
 }

@@ -9,7 +9,7 @@ use super::ticks::{Ticks, extent};
 use plotters::style::text_anchor::HPos;
 use supple_experiment::Demo;
 
-/// One stiffness.
+/// Point of the figure for one stiffness.
 pub struct Point {
     /// `K` \[N/m\].
     pub stiffness_n_per_m: f64,

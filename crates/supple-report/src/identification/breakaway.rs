@@ -1,6 +1,6 @@
 //! `supple breakaway`: measures the breakaway torque of each joint of the simulated arm.
 
-use super::joints::joints;
+use super::requested_joints::requested_joints;
 use serde::Serialize;
 use supple_cli::arguments::BreakawayArgs;
 use supple_cli::arms;
@@ -11,7 +11,7 @@ use supple_experiment::calibrate::plant_of;
 use supple_experiment::{Calibration, ExperimentError, breakaway, identify_ripple};
 use supple_model::with_dof;
 
-/// Result of one joint.
+/// Result for one joint.
 #[derive(Serialize)]
 pub struct Line {
     /// Name of the joint.
@@ -30,7 +30,7 @@ pub struct Line {
 /// [`Failure`].
 pub fn run(args: &BreakawayArgs) -> Result<(), Failure> {
     let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
-    let joints = joints(&args.joints, arm.dof())?;
+    let joints = requested_joints(&args.joints, arm.dof())?;
     let effects = args.plant.options(&arm)?;
     let lines = with_dof!(arm.dof(), N => {
         let calibration = Calibration {

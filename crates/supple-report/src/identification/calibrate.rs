@@ -20,14 +20,14 @@ use supple_plant::PlantOptions;
 /// Number of models drawn from the uncertainty of the fit to predict the tracking error.
 const DRAWS: u64 = 5;
 
-/// Folder of the plant's description, if it differs from that of `--arm`.
+/// Name of the folder for the plant's description, if it differs from the description of `--arm`.
 const PLANT: &str = "plant";
 
 #[derive(Serialize)]
 struct Summary {
     arm: String,
     seed: u64,
-    /// Effects of a real arm in the plant; empty without any.
+    /// Effects of a real arm in the plant; empty without effects.
     plant: PlantOptions,
     /// Joint, measured and true breakaway torque \[N m\].
     breakaway: Vec<(String, f64, f64)>,
@@ -37,7 +37,7 @@ struct Summary {
     truth: ModelAccuracy,
     /// Tracking of the sinusoid with this model; `None` if the arm cannot reach it.
     tracking: Option<IdentifiedModelTracking>,
-    /// The same, with calibration and plant without direction- and load-dependent friction.
+    /// Tracking of the sinusoid, with calibration and plant without direction- and load-dependent friction.
     tracking_without_load: Option<IdentifiedModelTracking>,
 }
 
@@ -54,8 +54,8 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
     if args.no_demo {
         return Ok(());
     }
-    // The demo is about the arm that was calibrated, with the noise of its encoders; its friction depends on direction and load
-    // also after a calibration without.
+    // The demo uses the arm that was calibrated, with its encoder noise; its friction depends on direction and load even if the
+    // calibration left this out.
     let effects = args.plant.options(&arm)?;
     let realistic_seeds = u64::from(!effects.is_none());
     let noise_rad = PlantOptions::default_encoder_noise_rad(&arm);
@@ -139,7 +139,7 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Resu
         predicted_tracking,
     };
     if args.ripple > 0.0 {
-        // The demo that follows uses the plant including its ripple, and adds the other effects itself.
+        // The demo uses the plant including its ripple, and adds the other effects itself.
         let rippling = Calibration {
             plant: PlantOptions::default(),
             ..calibration.clone()

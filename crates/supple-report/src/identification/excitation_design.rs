@@ -1,6 +1,6 @@
 //! `supple excite design`: designs an excitation trajectory; writes table, figure and summary.
 
-use super::joints::joints;
+use super::requested_joints::requested_joints;
 use crate::figures::identification::{Curves, curves};
 use serde::Serialize;
 use std::fmt::Write;
@@ -14,7 +14,7 @@ use supple_ident::FourierCoefficients;
 use supple_ident::excitation_design::{self, DesignOptions, ExcitationDesign, Workspace, design};
 use supple_model::{Description, with_dof};
 
-/// Rows of the table per second.
+/// Number of rows of the table per second \[Hz\].
 const TABLE_HZ: f64 = 100.0;
 
 #[derive(Serialize)]
@@ -38,7 +38,7 @@ struct Summary<'a> {
 /// [`Failure`].
 pub fn run(args: &DesignArgs) -> Result<(), Failure> {
     let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
-    let moving = joints(&args.moving, arm.dof())?;
+    let moving = requested_joints(&args.moving, arm.dof())?;
     let workspace = match args.workspace[..] {
         [a, b, c, d, e, f] => Some(Workspace {
             lower_m: [a, b, c],

@@ -16,7 +16,7 @@ use supple_plant::PlantOptions;
 /// Maximum size of a design file \[bytes\].
 const MAX_BYTES: u64 = 1 << 20;
 
-/// The fields of a design's `summary.json` that are needed here.
+/// The fields of a design's `summary.json` that this command uses.
 #[derive(Deserialize)]
 struct ExcitationDesign {
     arm: String,
@@ -31,9 +31,9 @@ struct Summary<'a> {
     design: &'a Path,
     log: std::path::PathBuf,
     seed: u64,
-    /// Effects of a real arm in the plant; empty without any.
+    /// Effects of a real arm in the plant; empty without effects.
     plant: &'a PlantOptions,
-    /// Durations of the designed motion and, unless left out, of the slow motion after it \[s\].
+    /// Durations of the designed motion and of the slow motion after it, unless omitted \[s\].
     recorded_s: Vec<f64>,
 }
 

@@ -18,13 +18,13 @@ use supple_model::{Description, with_dof};
 
 /// Fraction of the first log that is held out for validation if no validation log is given.
 const HELD_OUT_FRACTION: f64 = 0.2;
-/// Default of `--slow` for MCAP logs, which are supple's own and sampled fast enough to fit the Stribeck effect
+/// Default of `--slow` for MCAP logs, which supple writes at a rate that is sufficient to fit the Stribeck effect
 /// \[rad/s\].
 const SLOW_RAD_PER_S: f64 = 0.15;
 /// Number of models drawn from the uncertainty of the fit to predict the tracking error.
 const DRAWS: u64 = 5;
 
-/// Steps of an identification that are announced.
+/// Number of steps of an identification that are reported as progress.
 const STEPS: usize = 4;
 
 /// Output files.
@@ -79,7 +79,7 @@ fn procedure(args: &IdentifyArgs, period_s: f64, effects: Effects) -> Procedure 
     }
 }
 
-/// Whether all logs are MCAP, the format of supple's own logs.
+/// Whether all logs are MCAP files, the format that supple writes.
 fn all_mcap(args: &IdentifyArgs) -> bool {
     let is_mcap = |path: &std::path::PathBuf| {
         path.extension()
@@ -88,15 +88,15 @@ fn all_mcap(args: &IdentifyArgs) -> bool {
     args.logs.iter().all(is_mcap)
 }
 
-/// Speed below which samples of a joint are excluded from the fit, and used to fit the Stribeck effect; `None` if none
-/// are.
+/// Returns the speed below which samples of a joint are excluded from the fit and used to fit the Stribeck effect; `None` if no
+/// samples are excluded.
 fn slow_limit_rad_per_s(args: &IdentifyArgs) -> Option<f64> {
     args.slow
         .or(all_mcap(args).then_some(SLOW_RAD_PER_S))
         .filter(|speed| *speed > 0.0)
 }
 
-/// Motions with the names of their files.
+/// Motions, each with the name of its file.
 type NamedMotions = Vec<(String, Motion)>;
 
 fn motions<const N: usize>(

@@ -11,7 +11,7 @@ use supple_model::{Description, with_dof};
 
 /// Cutoff frequency of the filter \[Hz\].
 const CUTOFF_HZ: f64 = 8.0;
-/// A joint with a smaller range of motion counts as not moving \[rad\].
+/// Range of motion below which a joint counts as not moving \[rad\].
 const MOVED_RAD: f64 = 0.02;
 
 #[derive(Serialize)]
@@ -86,7 +86,7 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &LearnArgs) -> Result<(
     print_line(&format!("model: {}", args.out.display()))
 }
 
-/// The last `seconds` of a log, or all of it.
+/// Returns the last `seconds` of a log, or the whole log.
 fn end_of(log: Log, seconds: Option<f64>) -> Log {
     let (Some(seconds), Some(end)) = (seconds, log.t_s.last().copied()) else {
         return log;

@@ -1,15 +1,15 @@
 //! Identification commands: design an excitation, measure breakaway, identify from logs, learn from repeated motion,
-//! or do all of it on the simulated arm.
+//! or run all steps on the simulated arm.
 
 mod breakaway;
 mod calibrate;
 mod excitation_design;
 mod excitation_run;
 mod identify;
-mod joints;
 mod learn;
 mod paper;
 mod report;
+mod requested_joints;
 
 use supple_cli::arguments::{ExciteCommand, IdentificationCommand};
 use supple_cli::exit::Failure;

@@ -1,4 +1,4 @@
-//! `supple calibrate-paper`: the paper's own identification on the simulated arm of the paper.
+//! `supple calibrate-paper`: the identification procedure of the paper on the simulated arm of the paper.
 
 use serde::Serialize;
 use supple_cli::arguments::CalibratePaperArgs;

@@ -19,7 +19,7 @@ const CONFIDENCE: f64 = 1.96;
 pub struct Summary {
     /// Name of the arm.
     pub arm: String,
-    /// Logs that were fitted.
+    /// Names of the fitted logs.
     pub logs: Vec<String>,
     /// Rank: number of identifiable parameter combinations.
     pub rank: usize,
@@ -30,7 +30,7 @@ pub struct Summary {
     /// `|tau - tau_hat| / |tau|` on the training data.
     pub training_relative: f64,
     /// Prediction of the held-out data, per log.
-    pub held_out: Vec<HeldOut>,
+    pub held_out: Vec<HeldOutPrediction>,
     /// Fraction of random poses with a positive definite mass matrix.
     pub positive_definite: f64,
     /// Friction of each joint.
@@ -50,22 +50,22 @@ pub struct Summary {
     /// Interval of the tracking error at 5 N/m from the held-out residuals; `None` without evidence or if the sinusoid is out of
     /// reach.
     pub interval_at_5_n_per_m: Option<ErrorInterval>,
-    /// Result of the trial runs in simulation, as text: what the uncertainty of the parameters alone would give.
+    /// Result of the trial runs in simulation, as text: the tracking error that the uncertainty of the parameters alone would cause.
     pub trial_runs: String,
-    /// Given and found parameters of each link.
+    /// Given and identified parameters of each link.
     pub links: Vec<LinkChange>,
     /// Mean residual of each moving joint over its angle, by direction, in the first held-out log.
-    pub residual_over_angle: Vec<OverAngle>,
+    pub residual_over_angle: Vec<ResidualOverAngle>,
     /// Time from a logged torque to its action, for each held-out log \[s\]; negative if torques lag.
     pub torque_delay_s: Vec<f64>,
     /// The tracking error of the trial runs.
     pub foretold: Option<TrackingPrediction>,
 }
 
-/// Given and found parameters of a link.
+/// Given and identified parameters of a link.
 #[derive(Clone, Debug, Serialize)]
 pub struct LinkChange {
-    /// Name of the joint that moves it.
+    /// Name of the joint that moves the link.
     pub joint: String,
     /// Mass \[kg\].
     pub mass_kg: [f64; 2],
@@ -77,29 +77,29 @@ pub struct LinkChange {
 
 /// Mean residual of a joint over its angle.
 #[derive(Clone, Debug, Serialize)]
-pub struct OverAngle {
+pub struct ResidualOverAngle {
     /// Name of the joint.
     pub joint: String,
-    /// Least angle, as text \[rad\].
+    /// Minimum angle, as text \[rad\].
     pub from_rad: String,
-    /// Greatest angle, as text \[rad\].
+    /// Maximum angle, as text \[rad\].
     pub to_rad: String,
-    /// Mean residual in each twelfth of the range while the angle grows \[N m\], as text.
+    /// Mean residual in each twelfth of the range while the angle increases \[N m\], as text.
     pub forward: String,
-    /// The same while it falls.
+    /// Mean residual in each twelfth of the range while the angle decreases \[N m\], as text.
     pub backward: String,
 }
 
 /// Prediction of one log.
 #[derive(Clone, Debug, Serialize)]
-pub struct HeldOut {
+pub struct HeldOutPrediction {
     /// Name of the log.
     pub log: String,
     /// RMS error of each moving joint \[N m\].
     pub rms_nm: Vec<f64>,
     /// Relative error of each moving joint.
     pub relative: Vec<f64>,
-    /// The same over all joints.
+    /// Relative error over all joints.
     pub total_relative: f64,
 }
 
@@ -184,7 +184,7 @@ pub fn summary<const N: usize>(input: &ReportInput<'_, N>) -> Summary {
         held_out: input
             .held_out
             .iter()
-            .map(|(log, _, v)| HeldOut {
+            .map(|(log, _, v)| HeldOutPrediction {
                 log: log.clone(),
                 rms_nm: v.rms_nm.clone(),
                 relative: v.relative.clone(),
@@ -224,7 +224,7 @@ pub fn summary<const N: usize>(input: &ReportInput<'_, N>) -> Summary {
     }
 }
 
-/// Result of the trial runs as text.
+/// Describes the result of the trial runs.
 fn trial_runs(found: Option<&TrackingPrediction>) -> String {
     let Some(found) = found else {
         return "no trial run: the arm cannot reach the paper's sinusoid".to_owned();
@@ -257,10 +257,13 @@ fn links<const N: usize>(input: &ReportInput<'_, N>, names: &[String]) -> Vec<Li
     (0..N).map(change).collect()
 }
 
-/// Number of cells of [`OverAngle`].
+/// Number of parts into which [`ResidualOverAngle`] divides the range.
 const CELLS: usize = 12;
 
-fn over_angle<const N: usize>(input: &ReportInput<'_, N>, names: &[String]) -> Vec<OverAngle> {
+fn over_angle<const N: usize>(
+    input: &ReportInput<'_, N>,
+    names: &[String],
+) -> Vec<ResidualOverAngle> {
     let Some((_, motion, _)) = input.held_out.first() else {
         return Vec::new();
     };
@@ -285,7 +288,7 @@ fn over_angle<const N: usize>(input: &ReportInput<'_, N>, names: &[String]) -> V
             });
             means.collect::<Vec<_>>().join(" ")
         };
-        OverAngle {
+        ResidualOverAngle {
             joint: names[joint].clone(),
             from_rad: format!("{low:.2}"),
             to_rad: format!("{high:.2}"),
@@ -303,14 +306,14 @@ fn over_angle<const N: usize>(input: &ReportInput<'_, N>, names: &[String]) -> V
         .collect()
 }
 
-/// The interval of the tracking error at 5 N/m.
+/// Returns the interval of the tracking error at 5 N/m.
 fn interval<const N: usize>(input: &ReportInput<'_, N>) -> Option<ErrorInterval> {
     let motions: Vec<_> = input.held_out.iter().map(|held_out| &held_out.1).collect();
     let moving = input.fit.columns.identified_joints();
     error_interval_of::<N>(input.arm, moving, &motions, STIFFNESS_N_PER_M).ok()?
 }
 
-/// Verdict at 5 N/m as text, from the held-out residuals.
+/// Describes the verdict for 5 N/m, from the held-out residuals.
 fn at_5_n_per_m<const N: usize>(
     interval: Option<&ErrorInterval>,
     input: &ReportInput<'_, N>,
@@ -354,7 +357,7 @@ pub fn html<const N: usize>(
         .map_err(|error| Failure::ReportGeneration(error.to_string()))
 }
 
-/// Curves of measured and predicted torques, and of residuals.
+/// Draws the curves of measured and predicted torques, and of residuals.
 fn drawn<const N: usize>(
     input: &ReportInput<'_, N>,
     motion: &Motion,

@@ -7,17 +7,17 @@ use supple_core::nalgebra::Vector3;
 use supple_core::{Trajectory, Vector};
 use supple_model::{Description, reach};
 
-/// Poses whose tips show the workspace.
+/// Number of poses whose tip positions show the workspace.
 const POSES: u32 = 1500;
 /// Width and height of a view, and its margin \[px\].
 const VIEW_PX: (f64, f64) = (380.0, 380.0);
 const MARGIN_PX: f64 = 30.0;
-/// Height of a row of text, and width of a letter at most, of the font's 12 px \[px\].
+/// Height of a row of text, and maximum width of a letter, of the 12 px font \[px\].
 const ROW_PX: f64 = 22.0;
 const LETTER_PX: f64 = 7.0;
-/// Smallest length of the bar that is a joint's range \[px\].
+/// Minimum length of the bar that shows a joint's range \[px\].
 const BAR_PX: f64 = 160.0;
-/// Distance of text from the border and from what is beside it \[px\].
+/// Distance of text from the border and from neighbouring elements \[px\].
 const BORDER_PX: f64 = 20.0;
 const GAP_PX: f64 = 10.0;
 /// Colours of the workspace, the arm and its joints, the two paths, and the range and the angle at home of a joint.
@@ -32,7 +32,7 @@ const SPEED_M_PER_S: f64 = 0.06;
 /// Axes of a view: horizontal and vertical coordinate of a point.
 type View = fn(&Vector3<f64>, &Vector3<f64>) -> (f64, f64);
 
-/// The drawing as SVG.
+/// Draws the arm as SVG.
 ///
 /// # Errors
 /// If the arm does not have `N` joints.
@@ -126,12 +126,12 @@ pub fn svg<const N: usize>(arm: &Description) -> Result<String, Failure> {
     Ok(svg)
 }
 
-/// A joint's row.
+/// Row of a joint in the drawing.
 struct Row {
     name: String,
     lower: String,
     upper: String,
-    /// Place of the angle at home between the limits.
+    /// Position of the home angle between the limits, 0 to 1.
     home_share: f64,
 }
 
@@ -162,7 +162,7 @@ fn rows<const N: usize>(
     (0..N).map(row).collect()
 }
 
-/// The number with three significant digits or as an integer, without zeros at its end.
+/// Formats a number with three significant digits or as an integer, without trailing zeros.
 fn rounded(value: f64) -> String {
     let digits = 2.0 - value.abs().max(1e-3).log10().floor();
     let text = format!("{value:.*}", digits.clamp(0.0, 5.0) as usize);
@@ -172,7 +172,7 @@ fn rounded(value: f64) -> String {
     }
 }
 
-/// What the signs mean, below the views in a drawing of this width, and the number of its rows.
+/// Returns the legend below the views of a drawing of this width, and its number of rows.
 fn legend(width: f64) -> (String, usize) {
     let line = |colour: &str| {
         format!("<line x1=\"0\" x2=\"16\" stroke=\"{colour}\" stroke-width=\"2.5\"/>")

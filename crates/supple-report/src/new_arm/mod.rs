@@ -1,4 +1,4 @@
-//! `supple new`: an arm from a URDF.
+//! `supple new`: creates an arm from a URDF.
 
 mod drawing;
 
@@ -12,9 +12,9 @@ use supple_experiment::{Mismatch, Plan, Setup, Variant, run as simulate, scenari
 use supple_model::{Completed, Description, UrdfName, tip_weight_n, with_dof};
 use supple_plant::Scene;
 
-/// Time of the first run on the sinusoid \[s\].
+/// Duration of the first run on the sinusoid \[s\].
 const RUN_S: f64 = 5.0;
-/// What must be known about an arm, and no URDF contains.
+/// Facts about an arm that must be known before it moves and that no URDF contains.
 const BEFORE_A_REAL_ARM: [&str; 6] = [
     "sign and zero of every encoder and motor (`supple calibrate` checks the wiring first)",
     "torque constants and transmission: [motors]",
@@ -26,7 +26,7 @@ const BEFORE_A_REAL_ARM: [&str; 6] = [
 /// Files of the result.
 const FILES: [&str; 3] = ["arm.toml", "arm.urdf", "arm.svg"];
 
-/// What `supple new` reports.
+/// Report of `supple new`.
 #[derive(Debug, Serialize)]
 struct Summary {
     arm: String,
@@ -38,7 +38,7 @@ struct Summary {
     run_s: f64,
     rms_error_m: f64,
     max_error_m: f64,
-    /// Root mean square error that the rule allows, see [`scenario::allowed_error_m`].
+    /// Allowed root mean square error, see [`scenario::allowed_error_m`].
     allowed_error_m: f64,
     fault: Option<String>,
     derived: Vec<Setting>,
@@ -81,7 +81,7 @@ pub fn run(args: &NewArgs) -> Result<(), Failure> {
     arm.save(&folder)?;
     write(&folder.join("arm.toml"), &with_heading(arm, &folder, args)?)?;
     write(&folder.join("arm.svg"), &svg)?;
-    // What was written is what will be read; its warnings are those of the summary.
+    // The written files are read back; the warnings of the summary are those of the written files.
     Description::load(&folder)?.completed()?;
     if args.json {
         return print_json(&summary);
@@ -89,7 +89,7 @@ pub fn run(args: &NewArgs) -> Result<(), Failure> {
     print_line(&text(&summary))
 }
 
-/// Reads the URDF; asks for the tip at a terminal if it is not clear.
+/// Reads the URDF; asks for the tip on a terminal if it is ambiguous.
 fn read(name: &mut UrdfName) -> Result<Description, Failure> {
     let found = Description::from_urdf(name);
     let asks = name.tip.is_none() && std::io::stdin().is_terminal();
@@ -97,7 +97,7 @@ fn read(name: &mut UrdfName) -> Result<Description, Failure> {
         Err(error) if asks && error.to_string().contains("--tip LINK") => {
             print_status(&error.to_string());
             let mut output = std::io::stderr();
-            // An answer that cannot be asked for is an empty one, which the reader rejects.
+            // Without a terminal, the answer is empty, which the reader rejects.
             let _ = output
                 .write_all(b"tip link: ")
                 .and_then(|()| output.flush());
@@ -110,7 +110,7 @@ fn read(name: &mut UrdfName) -> Result<Description, Failure> {
     }
 }
 
-/// The sinusoid at 5 N/m with a model that is 0.1 % and 3 % off.
+/// Simulates the sinusoid at 5 N/m with a model that has errors of 0.1 % and 3 %.
 fn first_run<const N: usize>(completed: &Completed) -> Result<Summary, Failure> {
     let arm = &completed.description;
     let setup = Setup::<N>::new(arm, 0)?;
@@ -170,7 +170,7 @@ fn first_run<const N: usize>(completed: &Completed) -> Result<Summary, Failure> 
     })
 }
 
-/// The TOML with a heading that explains how to read it.
+/// Returns the TOML with a heading that explains it.
 fn with_heading(arm: &Description, folder: &Path, args: &NewArgs) -> Result<String, Failure> {
     let path = folder.join("arm.toml");
     let saved = supple_files::read_text(&path, Description::MAX_BYTES)
@@ -189,7 +189,7 @@ fn write(path: &Path, text: &str) -> Result<(), Failure> {
         .map_err(|error| Failure::file("write", path, error))
 }
 
-/// Lines of the derived settings: one for each key, with the values of all joints that share its reason.
+/// Formats the derived settings, one line for each key and reason, with the values of all joints that share them.
 fn settings_lines(derived: &[Setting]) -> Vec<String> {
     // Key, reason, and the values by joint.
     let mut groups: Vec<(&str, &str, Vec<String>)> = Vec::new();
@@ -199,7 +199,7 @@ fn settings_lines(derived: &[Setting]) -> Vec<String> {
             Some((joint, key)) => (Some(joint), key),
             None => (None, setting.key.as_str()),
         };
-        // Beside the inertia itself this adds nothing.
+        // The line of the inertia itself already contains this information.
         if key == "armature_is_estimate" {
             continue;
         }
@@ -281,11 +281,13 @@ fn text(summary: &Summary) -> String {
         "  joints without friction in the URDF: {}",
         list(&summary.without_friction)
     ));
-    lines.push("before a real arm moves you must know what no URDF contains:".to_owned());
+    lines.push(
+        "before a real arm moves, determine the following, which no URDF contains:".to_owned(),
+    );
     lines.extend(BEFORE_A_REAL_ARM.map(|line| format!("  - {line}")));
     lines.push(format!(
         "written: {folder}/arm.toml, {folder}/arm.urdf, {folder}/arm.svg (open it in a browser)\n\
-         next: supple demo --arm {folder}, or supple up --plant sim --arm {folder}; docs/own_arm.md goes on from here"
+         next: supple demo --arm {folder}, or supple up --plant sim --arm {folder}; docs/own_arm.md describes the next steps"
     ));
     lines.join("\n")
 }

@@ -81,7 +81,7 @@ fn at(lines: &[ProbingSummary], stiffness_n_per_m: f64) -> Option<&ProbingSummar
         .find(|line| line.stiffness_n_per_m == stiffness_n_per_m)
 }
 
-/// Values at those of these stiffnesses that were run.
+/// Formats the values at these stiffnesses; omits stiffnesses that were not run.
 fn values(
     lines: &[ProbingSummary],
     stiffnesses: &[f64],
@@ -143,7 +143,7 @@ pub(super) fn impulse(summary: &Summary) -> Section {
     }
 }
 
-/// Slopes of the impulse, each with the upper stiffness.
+/// Formats the slopes of the impulse, each with the upper stiffness.
 fn slopes(contact: &ContactStatistics) -> String {
     let slopes = contact.impulse_slopes.iter();
     let each = slopes.map(|s| format!("{} to {} N/m", plain(s.slope, 3), s.to_n_per_m));

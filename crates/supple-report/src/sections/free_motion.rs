@@ -7,7 +7,7 @@ use supple_experiment::JointTorque;
 use supple_experiment::metrics::median;
 use supple_experiment::summary::{QuadrantSummary, Summary, TrackingError};
 
-/// RMS and maximum error, and how the run ended if it ended early.
+/// Formats RMS and maximum error, and the reason if the run ended early.
 fn error(tracking: &TrackingError) -> String {
     let errors = format!("{}, {}", mm(tracking.rms_error_m), mm(tracking.max_error_m));
     match &tracking.ended {
@@ -44,7 +44,7 @@ pub(super) fn sinusoid(summary: &Summary) -> Section {
     }
 }
 
-/// The realistic plant, calibrated: the headline.
+/// Returns the rows of the realistic plant with a calibrated model.
 fn realistic(summary: &Summary) -> Vec<Row> {
     let Some(found) = &summary.realistic else {
         return Vec::new();
@@ -125,7 +125,7 @@ pub(super) fn quadrant(summary: &Summary) -> Section {
     }
 }
 
-/// Ratio of the mean error over the last quarter of each edge to its peak error.
+/// Formats the ratio of the mean error over the last quarter of each edge to its peak error.
 fn decay(quadrant: &QuadrantSummary) -> String {
     let ratios = quadrant.edges.iter().map(|edge| {
         let ratio = edge.last_quarter_error_m / edge.peak_error_m;

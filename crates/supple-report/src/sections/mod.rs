@@ -9,7 +9,7 @@ pub use row::{Row, Section, quadrants_with_models};
 use supple_experiment::FaultEnd;
 use supple_experiment::summary::Summary;
 
-/// All sections, in the order of the report.
+/// Returns all sections, in the order of the report.
 pub fn sections(summary: &Summary) -> Vec<Section> {
     vec![
         free_motion::sinusoid(summary),
@@ -24,8 +24,8 @@ pub fn sections(summary: &Summary) -> Vec<Section> {
     ]
 }
 
-/// Runs that ended with an unexpected fault. Excluded are those in which a fault is a result: runs with equation (3.6) exactly as
-/// printed, and, for an arm whose gains and limits were derived from its model, those on the realistic plant.
+/// Lists the runs that ended with an unexpected fault. Runs in which a fault is a valid result are excluded: runs with equation
+/// (3.6) exactly as printed and, for an arm whose gains and limits were derived from its model, runs on the realistic plant.
 pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
     let mut runs: Vec<(String, &Option<FaultEnd>)> = Vec::new();
     for run in &summary.sinusoid_by_speed {

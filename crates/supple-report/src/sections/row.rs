@@ -2,10 +2,10 @@
 
 use supple_experiment::summary::{QuadrantSummary, Summary};
 
-/// One subject of the paper.
+/// Section of the report about one subject of the paper.
 #[derive(Clone, Debug)]
 pub struct Section {
-    /// Name of the figure that goes with it.
+    /// Name of the figure of this section.
     pub figure: &'static str,
     /// Headline.
     pub title: &'static str,
@@ -28,7 +28,7 @@ pub struct Row {
     pub measured: String,
 }
 
-/// Runs of the quadrant, each with the model of its controller.
+/// Lists the runs of the quadrant, each with the model of its controller.
 pub fn quadrants_with_models(summary: &Summary) -> [(&QuadrantSummary, &'static str); 5] {
     [
         (&summary.quadrant, "exact model"),

@@ -1,4 +1,4 @@
-//! Invalid descriptions, infeasible experiments, read-only folders, a full disk: each gives one error line, the
+//! Tests of invalid descriptions, infeasible experiments, read-only folders and a full disk: each gives one error line, the
 //! documented exit code and no output files.
 
 use crate::support::{Answer, arg, assert_one_clear_line, fifo, program, run, run_in, tree};
@@ -32,7 +32,7 @@ fn demo_of(arm: &Path, out: &Path) -> Answer {
     ])
 }
 
-/// Replaces the first occurrence; there must be one.
+/// Replaces the first occurrence; panics if there is none.
 fn replaced(text: String, from: &str, to: &str) -> String {
     assert!(text.contains(from), "{from} is in the file");
     text.replacen(from, to, 1)
@@ -82,7 +82,7 @@ fn a_trajectory_out_of_reach_is_code_4() {
     let folder = tempfile::tempdir().expect("a folder");
     // The elbow's origin is the length of the upper arm: the shortened arm cannot reach the trajectory.
     let shorter = |urdf: String| replaced(urdf, "0.55", "0.15");
-    // Without [paths] the trajectories would be scaled to the shorter arm.
+    // Without [paths], the trajectories would be scaled to the shorter arm.
     let as_in_the_paper = |toml: String| {
         toml + "\n[paths]\nradius_m = 0.6\nazimuth_rad = 0.0\nheight_m = 0.0\nscale = 1.0\n"
     };
@@ -152,20 +152,20 @@ fn an_interrupt_is_code_130_and_leaves_no_files() {
     {
         assert!(
             child.try_wait().expect("a child").is_none(),
-            "it ended by itself"
+            "the program ended by itself"
         );
         std::thread::sleep(std::time::Duration::from_millis(20));
     }
     let sent = std::process::Command::new("kill")
         .args(["-INT", &pid])
         .status();
-    assert!(sent.expect("kill is there").success());
+    assert!(sent.expect("kill exists").success());
     let status = child.wait().expect("it ends");
     assert_eq!(status.code(), Some(130));
     assert!(tree(folder.path()).is_empty(), "{:?}", tree(folder.path()));
 }
 
-/// Devices and FIFOs are rejected and stay what they were.
+/// Devices and FIFOs are rejected and not changed.
 #[cfg(unix)]
 #[test]
 fn outputs_that_are_not_regular_files_are_code_6_before_anything_is_written() {

@@ -1,9 +1,9 @@
-//! The interface of the command line: commands and errors.
+//! Tests of the command line: commands and errors.
 
 use crate::support::{assert_one_clear_line, run};
 
 #[test]
-fn it_has_the_commands_that_need_no_running_system() {
+fn help_lists_the_commands_that_need_no_running_system() {
     let help = run(&["--help"]);
     assert_eq!(help.code, Some(0));
     let listed: Vec<&str> = help
@@ -44,7 +44,7 @@ fn an_unknown_arm_is_code_3_and_the_arms_are_listed() {
     assert!(answer.stdout.is_empty());
     assert!(
         crate::support::tree(folder.path()).is_empty(),
-        "nothing is left"
+        "no file is left"
     );
 }
 

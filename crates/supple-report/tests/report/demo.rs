@@ -20,19 +20,19 @@ const FIGURES: [&str; 9] = [
     "trade_off",
 ];
 
-/// The log that the tests read; the other logs have half a gigabyte and are not kept.
+/// The log that the tests read; the other logs take half a gigabyte and are not kept.
 const LOG: &str = "logs/sinusoid_law_as_printed.mcap";
 
-struct Ran {
+struct DemoRun {
     out: PathBuf,
     answer: Answer,
     /// All files that were written.
     files: Vec<PathBuf>,
 }
 
-/// The demo, run by the first test that needs it.
-fn ran() -> &'static Ran {
-    static RAN: OnceLock<Ran> = OnceLock::new();
+/// Returns the demo run; the first test that needs it runs the demo.
+fn demo_run() -> &'static DemoRun {
+    static RAN: OnceLock<DemoRun> = OnceLock::new();
     RAN.get_or_init(|| {
         let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("demo");
         let _ = fs::remove_dir_all(&out);
@@ -56,12 +56,12 @@ fn ran() -> &'static Ran {
         for log in logs.filter(|log| log.as_path() != Path::new(LOG)) {
             fs::remove_file(out.join(log)).expect("removed");
         }
-        Ran { out, answer, files }
+        DemoRun { out, answer, files }
     })
 }
 
 fn read(name: &str) -> String {
-    fs::read_to_string(ran().out.join(name)).expect(name)
+    fs::read_to_string(demo_run().out.join(name)).expect(name)
 }
 
 fn summary() -> Value {
@@ -69,8 +69,8 @@ fn summary() -> Value {
 }
 
 #[test]
-fn it_succeeds_and_prints_the_summary_and_the_path_of_the_report() {
-    let Ran { out, answer, .. } = ran();
+fn the_demo_succeeds_and_prints_the_summary_and_the_path_of_the_report() {
+    let DemoRun { out, answer, .. } = demo_run();
     assert_eq!(answer.code, Some(0), "{}", answer.stderr);
     assert_eq!(answer.stdout, read("summary.json"));
     let report = out.join("report.html");
@@ -85,7 +85,7 @@ fn it_succeeds_and_prints_the_summary_and_the_path_of_the_report() {
 
 #[test]
 fn all_results_are_complete() {
-    let files = &ran().files;
+    let files = &demo_run().files;
     let has = |name: &str| files.iter().any(|file| file == Path::new(name));
     for name in [
         "report.html",
@@ -201,7 +201,7 @@ fn the_summary_has_every_promised_number() {
     );
 }
 
-/// Asserts that the page neither loads nor runs anything.
+/// Asserts that the page loads no other file and runs no script.
 fn assert_self_contained(page: &str) {
     for outside in [
         "<script", "<link", "<img", "<iframe", "<object", "<use", "url(", "@import", "src=",
@@ -265,7 +265,7 @@ fn every_figure_is_complete_as_svg_and_png() {
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{figure}");
 
         let size = |name| root.attribute(name).and_then(|v| v.parse::<u32>().ok());
-        let png = fs::read(ran().out.join(format!("figures/{figure}.png"))).expect(figure);
+        let png = fs::read(demo_run().out.join(format!("figures/{figure}.png"))).expect(figure);
         let bitmap = Pixmap::decode_png(&png).expect(figure);
         assert_eq!(
             Some(bitmap.width()),
@@ -290,7 +290,7 @@ fn every_figure_is_complete_as_svg_and_png() {
 
 #[test]
 fn a_log_is_inspected_and_exported() {
-    let log = ran().out.join(LOG);
+    let log = demo_run().out.join(LOG);
     let info = run(&["log", "info", arg(&log)]);
     assert_eq!(info.code, Some(0), "{}", info.stderr);
     assert!(info.stdout.contains("wam4") && info.stdout.contains("/joint_states"));
@@ -337,7 +337,7 @@ fn a_log_is_inspected_and_exported() {
 
 #[test]
 fn a_replayed_log_is_bit_identical() {
-    let log = ran().out.join(LOG);
+    let log = demo_run().out.join(LOG);
     let replay = run(&["log", "replay", arg(&log), "--json"]);
     assert_eq!(replay.code, Some(0), "{}", replay.stderr);
     let replay: Value = serde_json::from_str(&replay.stdout).expect("JSON");
@@ -349,7 +349,7 @@ fn a_replayed_log_is_bit_identical() {
 #[test]
 fn a_truncated_log_gives_no_table_and_is_recovered() {
     let folder = tempfile::tempdir().expect("a folder");
-    let log = fs::read(ran().out.join(LOG)).expect("the log");
+    let log = fs::read(demo_run().out.join(LOG)).expect("the log");
     let cut = folder.path().join("run.mcap.part");
     fs::write(&cut, &log[..log.len() / 2]).expect("written");
 

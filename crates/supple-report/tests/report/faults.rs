@@ -1,4 +1,4 @@
-//! A demo whose runs end with a fault: all results are still written, and every fault is reported.
+//! Tests of a demo whose runs end with a fault: all results are written, and every fault is reported.
 
 use crate::support::{arg, assert_one_clear_line, run};
 use std::fs;
@@ -7,7 +7,7 @@ use supple_model::Description;
 /// An arm name that must be escaped in HTML.
 const NAME: &str = "timid <b>&";
 
-/// The 4-joint arm with a limit that the first millimetres of error exceed: all runs end before contact.
+/// Creates the 4-joint arm with a limit that the first millimetres of error exceed: all runs end before contact.
 fn timid_arm(folder: &std::path::Path) -> std::path::PathBuf {
     let arm = Description::asset("wam4").expect("built in");
     let mut names = 0;
@@ -36,7 +36,7 @@ fn timid_arm(folder: &std::path::Path) -> std::path::PathBuf {
 }
 
 #[test]
-fn runs_that_a_fault_ends_are_code_5_with_all_results() {
+fn a_demo_with_runs_that_a_fault_ended_exits_with_code_5_and_all_results() {
     let folder = tempfile::tempdir().expect("a folder");
     let arm = timid_arm(folder.path());
     let out = folder.path().join("out");

@@ -1,5 +1,5 @@
-//! Inputs that are made to exhaust a parser: each is refused within one second of processor time. The system counts that
-//! time (`ulimit -t`) and kills a program that needs more, so that the load of the machine does not matter.
+//! Tests with inputs that are made to exhaust a parser: each is refused within one second of processor time. The system
+//! measures this time (`ulimit -t`) and kills a program that exceeds it, so that the load of the machine does not matter.
 
 use crate::support::{Answer, PROGRAM, arg, assert_one_clear_line};
 use std::fmt::Write as _;
@@ -18,7 +18,7 @@ fn refused(folder: &Path, args: &[&str], codes: &[i32]) {
         .output()
         .expect("a shell");
     let answer = Answer::from(output);
-    // A program that was killed has no code.
+    // A program that was killed has no exit code.
     let code = answer
         .code
         .unwrap_or_else(|| panic!("{args:?}: more than {LIMIT_S} s"));
@@ -26,7 +26,7 @@ fn refused(folder: &Path, args: &[&str], codes: &[i32]) {
     assert_one_clear_line(&answer, &[]);
 }
 
-/// Links in a row, joined by fixed joints.
+/// Returns a URDF with a chain of links that fixed joints connect.
 fn chain(links: usize) -> String {
     let mut urdf = "<robot name=\"chain\"><link name=\"l0\"/>".to_owned();
     for link in 1..links {
@@ -92,7 +92,7 @@ fn each_hostile_description_is_refused_within_a_second_of_processor_time() {
 fn each_hostile_log_is_refused_within_a_second_of_processor_time() {
     let folder = tempfile::tempdir().expect("a folder");
     let magic = b"\x89MCAP0\r\n";
-    // A record of this kind that states this length.
+    // A record of this kind whose header has this length.
     let record = |kind: u8, length: u64, body: &[u8]| {
         let mut log = magic.to_vec();
         log.push(kind);

@@ -1,4 +1,4 @@
-//! Identification commands: complete results, and invalid input that is rejected with its column.
+//! Tests of the identification commands: complete results, and rejection of invalid input with its column.
 
 use crate::support::{arg, assert_one_clear_line, run};
 use std::path::Path;
@@ -81,7 +81,7 @@ fn a_design_writes_table_figure_and_summary() {
     assert_eq!(table.lines().count(), (100.0 * duration_s) as usize + 2);
 }
 
-/// Design, log, model, correction: each command uses the output of the previous one.
+/// Designs a motion, logs it, identifies a model and refits it; each command uses the output of the previous one.
 #[test]
 fn a_model_identified_from_a_designed_motion_loads() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -156,7 +156,7 @@ fn a_model_identified_from_a_designed_motion_loads() {
     ]);
     assert_eq!(empty.code, Some(9), "{}", empty.stderr);
     assert_one_clear_line(&empty, &["centre_rad", "4 joints"]);
-    // Designed for another arm, with a joint that this one lacks.
+    // The motion was designed for another arm, with a joint that this arm lacks.
     let summary = std::fs::read_to_string(folder.path().join("design/summary.json"));
     let mut edited: serde_json::Value =
         serde_json::from_str(&summary.expect("a summary")).expect("JSON");
@@ -230,7 +230,7 @@ fn a_calibration_prints_its_verdict_and_the_demo_with_its_model() {
         "{}",
         answer.stdout
     );
-    // The demo is about the arm that was calibrated: with its model and its encoders, without another plant.
+    // The demo uses the calibrated arm with its model and its encoders, and no other plant.
     let summary = std::fs::read_to_string(out.join("demo/summary.json")).expect("a summary");
     let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
     assert!(summary["model"].is_string(), "{}", summary["model"]);
@@ -238,7 +238,8 @@ fn a_calibration_prints_its_verdict_and_the_demo_with_its_model() {
     assert!(summary["realistic"].is_null(), "{}", summary["realistic"]);
 }
 
-/// Expected before the run: ten of twelve combinations; moments within 5 % of the plant's; gravity within 3 %.
+/// Expected values, written before the first run: ten of twelve combinations, moments within 5 % of the plant's, gravity within
+/// 3 %.
 #[test]
 fn the_papers_procedure_finds_the_moments_of_the_papers_arm() {
     let answer = run(&["calibrate-paper", "--json", "--quiet"]);

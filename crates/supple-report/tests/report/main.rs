@@ -1,4 +1,4 @@
-//! The program `supple-report`: arguments, results, errors and exit codes.
+//! Tests of the program `supple-report`: arguments, results, errors and exit codes.
 
 #[path = "../../../supple/tests/cli/support/mod.rs"]
 mod support;

@@ -1,4 +1,4 @@
-//! `supple new`: an arm from a URDF alone.
+//! Tests of `supple new`, which creates an arm from a URDF alone.
 
 use crate::support::{Answer, assert_one_clear_line, run_in, tree};
 use serde_json::Value;
@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 use supple_model::Description;
 
-/// The 4-joint arm's URDF without its TOML: it has masses and limits, and nothing that a controller needs.
+/// Writes the URDF of the 4-joint arm without its TOML. The URDF has masses and limits but no settings of a controller.
 fn robot_in(folder: &Path) {
     let built_in = Description::asset("wam4").expect("built in");
     fs::write(folder.join("robot.urdf"), built_in.urdf()).expect("written");
@@ -42,7 +42,7 @@ fn a_urdf_gives_an_arm_with_every_derived_setting_and_its_reason() {
     }
     let summary: Value = serde_json::from_str(&answer.stdout).expect("JSON");
 
-    // The text of the TOML has each setting; parsed, it has each value where the report states.
+    // The text of the TOML contains each setting, and the parsed TOML has each value at the reported key.
     let toml = read(&arm.join("arm.toml"));
     let derived = summary["derived"].as_array().expect("a list");
     assert!(derived.len() > 20, "{derived:?}");
@@ -60,7 +60,7 @@ fn a_urdf_gives_an_arm_with_every_derived_setting_and_its_reason() {
         assert!(line.is_some(), "{key} = {value} in {toml}");
         assert!(toml.contains(why), "{why} in {toml}");
     }
-    // What was written is complete: nothing is left to derive.
+    // The written TOML is complete: no setting remains to be derived.
     let written = Description::load(&arm).expect("an arm");
     assert!(written.completed().expect("complete").derived.is_empty());
 

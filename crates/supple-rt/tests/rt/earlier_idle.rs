@@ -1,11 +1,12 @@
-//! Idle overrides what is scheduled for a cycle that is not after it, however late that request arrives: a program that
-//! starts a system schedules gravity hold for the first cycle, and an operator who was quicker has the last word.
+//! Tests that an accepted idle request overrides every request for its cycle or an earlier one, however late that request
+//! arrives. Example: a program that starts a system schedules gravity hold for the first cycle, but an operator has already
+//! requested idle.
 
 use crate::support::Bench;
 use supple_core::controller::{Mode, Request};
 use supple_ipc::message::{Drives, OperatorReply, Outcome};
 
-/// The one reply to request `sequence` since the last call.
+/// Returns the only reply to request `sequence` since the last call.
 fn reply_to(bench: &mut Bench, sequence: u64) -> OperatorReply {
     let replies = bench.replies();
     let mut found = replies.iter().filter(|reply| reply.sequence == sequence);
@@ -23,7 +24,7 @@ fn assert_refused(bench: &mut Bench, sequence: u64) {
     assert!(reply.text.as_str().contains("idle"), "{reply:?}");
 }
 
-/// Idle is accepted while the plant has sent nothing yet.
+/// Requests idle, which is accepted before the plant has sent a state.
 fn idle_before_the_first_state(bench: &mut Bench) {
     bench.idle().set_requested(1);
     assert!(bench.run_iteration());
@@ -46,9 +47,9 @@ fn idle_before_the_first_state_overrides_the_first_cycle() {
     }
 }
 
-/// What waits for a later cycle is dropped as by any other request of idle; a later request is carried out.
+/// Idle refuses requests that wait for a later cycle; a request that is sent after idle is executed.
 #[test]
-fn idle_before_the_first_state_refuses_what_was_queued_before() {
+fn idle_before_the_first_state_refuses_requests_that_were_queued_before() {
     let mut bench = Bench::new(false);
     bench.request(&Request::GravityHold, Some(5));
     idle_before_the_first_state(&mut bench);
@@ -74,7 +75,7 @@ fn a_request_that_arrives_after_idle_for_an_earlier_cycle_is_refused() {
         assert_eq!(bench.active_cycle().mode(), Some(Mode::Idle));
         assert_refused(&mut bench, sequence);
     }
-    // Requests for a cycle after it, and at once, are carried out.
+    // Requests for a cycle after idle, and for the next cycle, are executed.
     bench.request(&Request::GravityHold, Some(5));
     assert_eq!(bench.active_cycle().mode(), Some(Mode::GravityHold));
     bench.request(&Request::Idle, None);
@@ -83,9 +84,9 @@ fn a_request_that_arrives_after_idle_for_an_earlier_cycle_is_refused() {
     assert_eq!(bench.active_cycle().mode(), Some(Mode::GravityHold));
 }
 
-/// Without idle a request that comes late is carried out.
+/// Without an idle request, a request that arrives after its cycle is executed.
 #[test]
-fn a_request_for_an_earlier_cycle_is_carried_out_without_idle() {
+fn a_request_for_an_earlier_cycle_is_executed_without_idle() {
     let mut bench = Bench::new(false);
     for _ in 0..4 {
         bench.active_cycle();
@@ -94,9 +95,9 @@ fn a_request_for_an_earlier_cycle_is_carried_out_without_idle() {
     assert_eq!(bench.active_cycle().mode(), Some(Mode::GravityHold));
 }
 
-/// A plant that was started anew counts from zero: what is scheduled in its cycles is carried out.
+/// A restarted plant counts its cycles from zero: requests for its cycles are executed.
 #[test]
-fn a_plant_that_counts_anew_is_not_bound_to_the_old_cycles() {
+fn an_earlier_idle_does_not_override_requests_after_a_restart_of_the_plant() {
     let mut bench = Bench::new(false);
     bench.cycle = 1000;
     bench.active_cycle();
@@ -104,7 +105,7 @@ fn a_plant_that_counts_anew_is_not_bound_to_the_old_cycles() {
     bench.active_cycle();
     bench.cycle = 0;
     bench.active_cycle();
-    // The controller has latched a fault for the cycles out of order.
+    // The controller has latched a fault because the cycles are out of order.
     bench.request(&Request::Reset, None);
     bench.active_cycle();
     bench.request(&Request::GravityHold, Some(bench.cycle + 2));

@@ -1,4 +1,4 @@
-//! The last cycles before a fault: recording never waits for the disk, and old tables are deleted.
+//! Tests of the fault tables: recording never waits for the disk, and old tables are deleted.
 
 use core::time::Duration;
 use std::fs;
@@ -10,7 +10,7 @@ use supple_ipc::message::{ArmState, CycleTiming, Drives, PlantReport, Telemetry}
 use supple_model::Description;
 use supple_rt::{FaultFiles, FaultRecorder, KEPT_FILES};
 
-/// Telemetry of one cycle, with or without a latched fault.
+/// Returns telemetry of one cycle, with or without a latched fault.
 fn telemetry(step_number: u64, fault: u8) -> Telemetry {
     let description = Description::asset("wam4").expect("built in");
     let controller: Controller<4> =
@@ -39,16 +39,16 @@ fn telemetry(step_number: u64, fault: u8) -> Telemetry {
     Telemetry::of(&record, &state, CycleTiming::default())
 }
 
-/// A task that blocks the thread that writes stands for a hanging disk.
+/// A job that blocks the writer thread simulates a disk that does not answer.
 #[test]
-fn hanging_disk_blocks_nothing_and_dropped_tables_are_counted() {
+fn recording_does_not_wait_for_a_hanging_disk_and_counts_dropped_tables() {
     let folder = tempfile::tempdir().expect("a folder");
     let faults = folder.path().join("faults");
     let files = FaultFiles::start(faults.clone()).expect("a thread");
     let (unblock, blocked) = sync_channel::<()>(0);
     let (started, has_started) = sync_channel(1);
     assert!(files.writer().submit(move || {
-        started.send(()).expect("the test waits");
+        started.send(()).expect("the test receives");
         blocked.recv().expect("the test unblocks it");
     }));
     has_started.recv().expect("it starts");

@@ -1,4 +1,4 @@
-//! The real program under a simulated service manager: a datagram socket.
+//! Tests of the program `supple-rt` under a simulated service manager, which is a datagram socket.
 
 use crate::support::terminate;
 use std::os::unix::fs::PermissionsExt;
@@ -49,7 +49,7 @@ fn service_manager_gets_ready_watchdog_and_stopping() {
     let manager = manager();
     let mut child = manager.start("100000");
     assert_eq!(manager.next(), "READY=1\n");
-    // There is no plant: a loop that waits for one is alive.
+    // No plant is connected: the loop counts as alive while it waits for one.
     for _ in 0..3 {
         assert_eq!(manager.next(), "WATCHDOG=1\n");
     }
@@ -68,7 +68,7 @@ fn invalid_watchdog_time_is_refused_at_start() {
     assert!(text.contains("WATCHDOG_USEC is `soon`"), "{text}");
 }
 
-/// The liveness counter follows the loop: one count per iteration, none without.
+/// The liveness counter increases by one in each iteration of the loop, and not otherwise.
 #[test]
 fn stalled_loop_sends_no_watchdog_message() {
     let folder = tempfile::tempdir().expect("a folder");

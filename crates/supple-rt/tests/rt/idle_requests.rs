@@ -1,4 +1,4 @@
-//! Idle acts within 20 cycles of its request, whatever else happens.
+//! Tests that the controller enters idle within 20 cycles of the request, whatever else happens.
 
 use crate::scripted::{Bench, PERIOD};
 use crate::support::terminate;
@@ -15,11 +15,11 @@ use supple_ipc::{OperatorClient, TelemetryReader};
 use supple_model::Description;
 use supple_realtime::pause;
 
-/// Time for which the disk does not answer.
+/// Time for which the simulated disk does not answer.
 const DISK_HANGS: Duration = Duration::from_secs(4);
-/// A user that owns nothing of ours.
+/// Id of a user that owns no file of this test.
 const NOBODY: u32 = 65534;
-/// Says to a child process of this test that it has shared memory of its own.
+/// Environment variable that tells a child process of this test that it has a separate /dev/shm.
 const OWN_SHARED_MEMORY: &str = "SUPPLE_TEST_OWN_SHARED_MEMORY";
 
 fn end(mut bench: Bench) {
@@ -28,25 +28,25 @@ fn end(mut bench: Bench) {
     assert_eq!(status.code(), Some(0), "{status}");
 }
 
-/// A thread of another process that is stopped, alone, until this is dropped.
-struct Stopped(libc::pid_t);
+/// A stopped thread of another process; dropping this value lets it continue.
+struct StoppedThread(libc::pid_t);
 
-impl Stopped {
+impl StoppedThread {
     /// Stops the thread of this name; `None` if the system does not permit it.
-    fn thread(child: &Child, name: &str) -> Option<Stopped> {
+    fn thread(child: &Child, name: &str) -> Option<StoppedThread> {
         let tasks = format!("/proc/{}/task", child.id());
         let mut tasks = std::fs::read_dir(tasks).expect("it runs").flatten();
         let task = tasks.find(|task| {
             std::fs::read_to_string(task.path().join("comm")).is_ok_and(|comm| comm.trim() == name)
         });
-        let task = task.expect("the thread is there").file_name();
+        let task = task.expect("the thread exists").file_name();
         let id: libc::pid_t = task.to_string_lossy().parse().expect("a number");
         let none = core::ptr::null_mut::<libc::c_void>();
-        // SAFETY: these calls pass no memory but the word for the status.
+        // SAFETY: these calls pass no memory except the status word.
         unsafe {
             if libc::ptrace(libc::PTRACE_SEIZE, id, none, none) != 0 {
                 println!(
-                    "skipped: no thread can be stopped: {}",
+                    "skipped: this user may not stop a thread: {}",
                     std::io::Error::last_os_error()
                 );
                 return None;
@@ -55,14 +55,14 @@ impl Stopped {
             let mut status = 0;
             assert_eq!(libc::waitpid(id, &raw mut status, libc::__WALL), id);
         }
-        Some(Stopped(id))
+        Some(StoppedThread(id))
     }
 }
 
-impl Drop for Stopped {
+impl Drop for StoppedThread {
     fn drop(&mut self) {
         let none = core::ptr::null_mut::<libc::c_void>();
-        // SAFETY: no memory is passed; the thread may be gone.
+        // SAFETY: the call passes no memory; the thread may have ended.
         unsafe { libc::ptrace(libc::PTRACE_DETACH, self.0, none, none) };
     }
 }
@@ -71,15 +71,15 @@ fn fault_tables(bench: &Bench) -> usize {
     std::fs::read_dir(bench.domain.folder().join("faults")).map_or(0, Iterator::count)
 }
 
-/// A disk that does not answer for four seconds while it takes the table of a fault: idle, reset and telemetry go on, and
-/// the table is written afterwards.
+/// The disk does not answer for four seconds while the table of a fault is written: idle, reset and telemetry continue to
+/// work, and the table is written afterwards.
 #[test]
 fn idle_acts_while_the_disk_hangs() {
     let mut bench = Bench::start(Stdio::null());
     let mut reader = TelemetryReader::new(&bench.domain).expect("a reader");
     let mut operator = OperatorClient::new(&bench.domain).expect("an operator");
     bench.hold(&mut operator);
-    let Some(stopped) = Stopped::thread(&bench.child, "supple-rt-disk") else {
+    let Some(stopped) = StoppedThread::thread(&bench.child, "supple-rt-disk") else {
         return end(bench);
     };
     bench.fault();
@@ -108,8 +108,8 @@ fn idle_acts_while_the_disk_hangs() {
     end(bench);
 }
 
-/// A reader of telemetry that does not read for more than two seconds: idle acts, and the reader goes on afterwards with
-/// what is left for it.
+/// A reader of telemetry does not read for more than two seconds: idle acts, and the reader then continues with the cycles
+/// that are left in its queue.
 #[test]
 fn idle_acts_while_a_reader_lags() {
     let mut bench = Bench::start(Stdio::null());
@@ -118,7 +118,7 @@ fn idle_acts_while_a_reader_lags() {
     bench.hold(&mut operator);
     bench.run(2500);
     bench.assert_idle_acts(&mut operator);
-    // What it left unread is older; then it gets what is new.
+    // The unread telemetry is older; after it, the reader receives new telemetry.
     while reader.receive().expect("read").is_some() {}
     bench.run(100);
     let mut last = None;
@@ -130,17 +130,17 @@ fn idle_acts_while_a_reader_lags() {
     end(bench);
 }
 
-/// Removes a file that the test created in /dev/shm.
-struct Made(PathBuf);
+/// A file that the test created in /dev/shm; dropping this value removes the file.
+struct RemovedOnDrop(PathBuf);
 
-impl Drop for Made {
+impl Drop for RemovedOnDrop {
     fn drop(&mut self) {
         let _ = std::fs::remove_file(&self.0);
     }
 }
 
-/// Another user's files in /dev/shm that are named like ours, made while the system runs: new clients are refused with
-/// the reason or served, and idle acts.
+/// While the system runs, another user creates files in /dev/shm that are named like the system's: new clients are served
+/// or refused with the reason, and idle acts.
 #[test]
 fn idle_acts_beside_files_of_another_user() {
     let mut bench = Bench::start(Stdio::null());
@@ -149,10 +149,10 @@ fn idle_acts_beside_files_of_another_user() {
     let prefix = bench.domain.object_prefix();
     let mut made = Vec::new();
     for name in ["not_ours", "node.0_9_3.global_mgmt", "zzz.data"] {
-        let file = Made(Path::new("/dev/shm").join(format!("{prefix}{name}")));
+        let file = RemovedOnDrop(Path::new("/dev/shm").join(format!("{prefix}{name}")));
         std::fs::write(&file.0, b"nonsense").expect("written");
         if let Err(error) = chown(&file.0, Some(NOBODY), Some(NOBODY)) {
-            println!("skipped: no file can be given to another user: {error}");
+            println!("skipped: this user may not change the owner of a file: {error}");
             return end(bench);
         }
         made.push(file);
@@ -169,7 +169,7 @@ fn idle_acts_beside_files_of_another_user() {
     end(bench);
 }
 
-/// Shared memory of which other processes have taken all that was left: idle acts. In a namespace of its own.
+/// Other processes have used all free shared memory: idle acts. The test runs in a separate mount namespace.
 #[test]
 fn idle_acts_while_shared_memory_is_full() {
     if std::env::var_os(OWN_SHARED_MEMORY).is_some() {
@@ -200,7 +200,7 @@ fn with_full_shared_memory() {
     let mut operator = OperatorClient::new(&bench.domain).expect("an operator");
     bench.hold(&mut operator);
     let filled = std::fs::write("/dev/shm/fill", vec![0_u8; 200 << 20]);
-    assert!(filled.is_err(), "it is full");
+    assert!(filled.is_err(), "/dev/shm is full");
     bench.assert_idle_acts(&mut operator);
     bench.hold(&mut operator);
     bench.fault();
@@ -209,7 +209,7 @@ fn with_full_shared_memory() {
     end(bench);
 }
 
-/// A move that waits is checked from the pose in which the arm is shortly before: there the tip would be too fast.
+/// A move that waits is checked from the pose of the arm shortly before its cycle: from there the tip would be too fast.
 #[test]
 fn a_move_that_waits_is_checked_from_the_pose_in_which_it_begins() {
     let description = Description::asset("wam4").expect("built in");
@@ -217,12 +217,12 @@ fn a_move_that_waits_is_checked_from_the_pose_in_which_it_begins() {
     let controller = Controller::new(config).expect("valid");
     let mut bench = Bench::start(Stdio::null());
     let home = Vector::from(bench.position_rad);
-    // A move from home that is refused for the speed of the tip alone: each joint turns by one radian, or not, and slower
-    // than it may.
+    // A move from home that is refused only for the speed of the tip: each joint turns by one radian or not at all, below its
+    // speed limit.
     let to = |code: u32| {
         let way = |joint: usize| match config.roles[joint] {
             Role::Active => f64::from(code / 3_u32.pow(joint as u32) % 3) - 1.0,
-            // Its loop would move it back, which this arm does not show.
+            // The position loop would move the joint back, which this scripted arm does not simulate.
             Role::Held { .. } => 0.0,
         };
         Request::Move {
@@ -232,7 +232,7 @@ fn a_move_that_waits_is_checked_from_the_pose_in_which_it_begins() {
     };
     let request = (0..81).map(to).find(|request| {
         let checked = supple_core::controller::check_motion(&controller, &home, request);
-        // The target is within the stops, with room for the soft ones.
+        // The target is within the hard stops, with a margin for the soft stops.
         let Request::Move { target_rad, .. } = request else {
             return false;
         };
@@ -248,11 +248,11 @@ fn a_move_that_waits_is_checked_from_the_pose_in_which_it_begins() {
     let Request::Move { target_rad, .. } = request else {
         panic!("{request:?}");
     };
-    // From its target it is no motion at all.
+    // From its target, the move has length zero.
     bench.position_rad = target_rad.into();
     let mut operator = OperatorClient::new(&bench.domain).expect("an operator");
     bench.hold(&mut operator);
-    // The arm is moved by hand meanwhile, without torque. (What is requested before that is refused for it.)
+    // The arm is then moved by hand, without torque. (Requests from before that are refused because of it.)
     bench.drives = Drives::Idle;
     bench.run(10);
     let at_cycle = bench.cycle + 600;

@@ -1,4 +1,4 @@
-//! The controller's process and its parts. `control_loop.rs` counts allocations in a program of its own.
+//! Tests of the controller's process and its parts. `control_loop.rs` counts allocations and is a separate program.
 
 #[path = "../support/mod.rs"]
 mod support;

@@ -1,4 +1,4 @@
-//! The loop receives operator requests within a bounded number of cycles, whatever else is queued.
+//! Tests that the loop receives operator requests within a bounded number of cycles, whatever else is queued.
 
 use crate::support::Bench;
 use supple_core::controller::{Mode, Request, SetPoint};
@@ -8,7 +8,7 @@ use supple_ipc::message::{ArmState, Drives, OperatorReply, Outcome};
 /// A cycle that no test reaches.
 const NEVER: Option<u64> = Some(1_000_000);
 
-/// Runs in gravity hold with a full request queue.
+/// Creates a loop in gravity hold with a full request queue.
 fn held_with_a_full_queue() -> Bench {
     let mut bench = Bench::new(false);
     assert!(bench.enqueue(1, 1, &Request::GravityHold, None));
@@ -46,7 +46,7 @@ fn idle_precedes_sixteen_queued_requests() {
     );
 }
 
-/// The queue between helper and loop is full too: it refuses other requests, but not idle.
+/// The queue between helper and loop is also full: it refuses other requests, but not idle.
 #[test]
 fn idle_is_accepted_when_the_queue_refuses_other_requests() {
     let mut bench = held_with_a_full_queue();
@@ -72,7 +72,7 @@ fn idle_channel_takes_effect_in_the_next_cycle_and_answers_all_requests() {
     );
     let accepted = |reply: &&OperatorReply| (50..58).contains(&reply.sequence);
     assert_eq!(bench.replies().iter().filter(accepted).count(), 8);
-    // One request gets one answer.
+    // Each request gets one reply.
     bench.active_cycle();
     assert_eq!(bench.idle().reply(), None);
     assert!(bench.enqueue(1, 90, &Request::GravityHold, None));
@@ -94,15 +94,15 @@ fn deferred_idle_precedes_earlier_requests_for_the_same_cycle() {
     assert_eq!(bench.active_cycle().mode(), Some(Mode::Idle));
 }
 
-/// Somebody who takes hold of the arm is not surprised by a motion that was scheduled before.
+/// A person who guides the arm by hand must not be surprised by a motion that was scheduled before.
 #[test]
-fn gravity_hold_and_float_at_once_refuse_what_is_scheduled() {
+fn gravity_hold_and_float_in_the_next_cycle_refuse_scheduled_requests() {
     for rest in [Request::GravityHold, Request::Float] {
         let mut bench = Bench::new(false);
         assert!(bench.enqueue(1, 1, &Request::GravityHold, None));
         bench.active_cycle();
         assert!(bench.enqueue(1, 2, &Request::Reset, Some(20)));
-        // A scheduled gravity hold is part of a schedule, and ends none.
+        // A scheduled gravity hold is part of a schedule and does not refuse other requests.
         assert!(bench.enqueue(1, 3, &Request::GravityHold, Some(bench.cycle + 2)));
         for _ in 0..4 {
             bench.active_cycle();
@@ -118,9 +118,9 @@ fn gravity_hold_and_float_at_once_refuse_what_is_scheduled() {
     }
 }
 
-/// A burst of set-points between two cycles is not carried out one cycle after another: the newest counts.
+/// Of several set-points that arrive between two cycles, only the newest is executed.
 #[test]
-fn of_several_set_points_the_newest_is_carried_out() {
+fn only_the_newest_of_several_set_points_is_executed() {
     let mut bench = Bench::new(false);
     let point = |at_cycle| {
         Request::SetPoint(SetPoint {
@@ -168,7 +168,7 @@ fn one_operator_can_use_at_most_half_of_the_queue() {
 
 /// Without a plant the arm stays idle, and the operator gets a reply.
 #[test]
-fn idle_is_answered_before_there_is_a_plant() {
+fn idle_is_answered_without_a_plant() {
     let mut bench = Bench::new(false);
     bench.idle().set_requested(1);
     assert!(bench.run_iteration());
@@ -179,7 +179,7 @@ fn idle_is_answered_before_there_is_a_plant() {
     );
 }
 
-/// Idle takes effect while the plant sends no states: the loop continues without it.
+/// Idle takes effect while the plant sends no states: the loop continues without the plant.
 #[test]
 fn idle_takes_effect_while_the_plant_sends_no_states() {
     let mut bench = Bench::new(false);

@@ -1,4 +1,4 @@
-//! The real program against a scripted plant.
+//! Tests of the program `supple-rt` with a scripted plant.
 
 use crate::support::terminate;
 use core::time::Duration;
@@ -90,7 +90,7 @@ fn answers_equal_those_of_step() {
         }
         pause(Duration::from_millis(1));
     };
-    // Leaves the helper time to receive the request before the first state.
+    // The pause gives the helper time to receive the request before the first state.
     pause(Duration::from_millis(50));
     let description = Description::asset("wam4").expect("built in");
     let controller = Controller::new(description.config::<4>().expect("valid")).expect("valid");
@@ -122,7 +122,7 @@ fn answers_equal_those_of_step() {
     assert_eq!(reply(), (sequence, Outcome::Queued));
     assert_eq!(reply(), (sequence, Outcome::Accepted));
     child.kill().expect("SIGKILL");
-    child.wait().expect("it is gone");
+    child.wait().expect("the process ended");
 }
 
 #[test]
@@ -146,13 +146,19 @@ fn fault_writes_last_cycles_to_a_file_that_only_the_owner_can_read() {
     );
     let folder = system.domain.folder().join("faults");
     let files: Vec<_> = std::fs::read_dir(&folder)
-        .expect("it is there")
+        .expect("the file exists")
         .flatten()
         .collect();
     assert_eq!(files.len(), 1);
     let path = files[0].path();
     assert!(stderr(&output).contains(&path.display().to_string()));
-    let mode = |path: &Path| path.metadata().expect("it is there").permissions().mode() & 0o777;
+    let mode = |path: &Path| {
+        path.metadata()
+            .expect("the file exists")
+            .permissions()
+            .mode()
+            & 0o777
+    };
     assert_eq!((mode(&folder), mode(&path)), (0o700, 0o600));
     let table = std::fs::read_to_string(&path).expect("readable");
     let rows: Vec<Vec<&str>> = table
@@ -162,7 +168,7 @@ fn fault_writes_last_cycles_to_a_file_that_only_the_owner_can_read() {
     assert_eq!(
         rows.len(),
         1 + 7,
-        "a header, and the cycles up to the fault"
+        "the table has a header and the cycles up to the fault"
     );
     assert!(rows.iter().all(|row| row.len() == rows[0].len()), "{table}");
     let column = |name: &str| {
@@ -192,7 +198,7 @@ fn a_second_controller_is_refused_with_the_reason() {
         stderr(&output)
     );
     first.kill().expect("SIGKILL");
-    first.wait().expect("it is gone");
+    first.wait().expect("the process ended");
     // A new controller replaces the killed one.
     let mut third = system.start(&["--virtual-time"]);
     let mut cycle = 1;
@@ -207,7 +213,7 @@ fn a_second_controller_is_refused_with_the_reason() {
         publish(&plant, &state(cycle));
     }
     third.kill().expect("SIGKILL");
-    third.wait().expect("it is gone");
+    third.wait().expect("the process ended");
 }
 
 #[test]

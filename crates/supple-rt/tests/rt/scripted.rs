@@ -1,4 +1,4 @@
-//! The real program with a scripted plant whose arm rests, by the clock.
+//! Runs the program `supple-rt` with a scripted plant in real time, whose arm stands still.
 
 use core::time::Duration;
 use std::process::{Child, Command, Stdio};
@@ -14,7 +14,7 @@ use tempfile::TempDir;
 pub const PERIOD: Duration = Duration::from_millis(2);
 /// Maximum number of cycles until an idle request is answered: 20 ms at the arm's rate.
 pub const MAX_CYCLES_TO_IDLE: u64 = 20;
-/// A blocked process fails every attempt, a busy machine does not.
+/// Number of attempts: a blocked process fails all of them, a busy machine does not.
 const ATTEMPTS: u32 = 5;
 
 pub struct Bench {
@@ -76,7 +76,7 @@ impl Bench {
                 return;
             }
         }
-        panic!("mode {} did not come", mode.name());
+        panic!("the controller did not enter mode {}", mode.name());
     }
 
     /// Requests idle while the plant runs; returns the answer and the number of cycles until it.
@@ -105,7 +105,7 @@ impl Bench {
         for _ in 0..10_000 {
             match self.cycle() {
                 Some(Mode::GravityHold) => return,
-                // The states came late from a busy machine.
+                // The machine was busy, and the states arrived late.
                 Some(Mode::Fault) => {
                     self.reset(operator);
                     let sent = operator.send::<4>(&Request::GravityHold, None);
@@ -114,10 +114,10 @@ impl Bench {
                 _ => {}
             }
         }
-        panic!("mode gravity_hold did not come");
+        panic!("the controller did not enter mode gravity_hold");
     }
 
-    /// Asks for idle in gravity hold, and asserts that it acts in time.
+    /// Requests idle in gravity hold, and asserts that it acts in time.
     pub fn assert_idle_acts(&mut self, operator: &mut OperatorClient) {
         let mut quickest = u64::MAX;
         for _ in 0..ATTEMPTS {
@@ -130,10 +130,10 @@ impl Bench {
                 return;
             }
         }
-        panic!("idle acts after {quickest} cycles");
+        panic!("idle acted after {quickest} cycles, which is too late");
     }
 
-    /// Missing states latch a fault; leaves the threads that write about it time to block.
+    /// Omits states until a fault latches, then waits so that the writing threads can block.
     pub fn fault(&mut self) {
         self.cycle += 10;
         self.until(Mode::Fault);
@@ -143,7 +143,7 @@ impl Bench {
     /// Resets the fault.
     pub fn reset(&mut self, operator: &mut OperatorClient) {
         let reset = operator.send::<4>(&Request::Reset, None).expect("sent");
-        assert!(reset.is_some(), "the helper is there");
+        assert!(reset.is_some(), "the helper is connected");
         for _ in 0..10_000 {
             if self.cycle().is_some_and(|mode| mode != Mode::Fault) {
                 return;
@@ -155,7 +155,7 @@ impl Bench {
 
 impl Drop for Bench {
     fn drop(&mut self) {
-        // A test that failed leaves no process.
+        // A failed test must not leave a running process.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

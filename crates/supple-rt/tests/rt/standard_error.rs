@@ -1,4 +1,4 @@
-//! The real program with a standard error that has no reader: full, or closed.
+//! Tests of the program `supple-rt` whose standard error is not read: full, or closed.
 
 use crate::scripted::Bench;
 use crate::support::terminate;
@@ -8,7 +8,7 @@ use supple_core::controller::Mode;
 use supple_ipc::OperatorClient;
 use supple_ipc::message::Outcome;
 
-/// A full pipe.
+/// Creates a full pipe.
 fn full() -> (PipeReader, PipeWriter) {
     let (reader, mut writer) = pipe().expect("a pipe");
     let flags = fcntl_getfl(&writer).expect("flags");

@@ -1,5 +1,5 @@
-//! A control loop with its ports and queues under the test's control, and the end of a process.
-#![allow(dead_code, reason = "each test program takes its own part of this")]
+//! A control loop whose ports and queues the test controls, and a function that ends a process.
+#![allow(dead_code, reason = "each test program uses only some of these items")]
 
 use core::time::Duration;
 use rustix::process::{Pid, Signal, kill_process};
@@ -63,7 +63,7 @@ impl Bench {
         }
     }
 
-    /// The arm at rest at home.
+    /// Returns a state of the arm at standstill in its home pose.
     pub fn state(&self, drives: Drives) -> ArmState {
         ArmState::new::<4>(
             self.cycle,
@@ -82,7 +82,7 @@ impl Bench {
             .expect("an iteration")
     }
 
-    /// The plant announces a state.
+    /// Announces a state on behalf of the plant.
     pub fn announce(&mut self) {
         self.plant.announce().expect("announced");
         assert!(self.run_iteration());
@@ -110,7 +110,7 @@ impl Bench {
         self.idle.as_mut().expect("there")
     }
 
-    /// A request of operator 1, numbered from 1 in order.
+    /// Queues a request of operator 1; the sequence numbers count from 1.
     pub fn request(&mut self, request: &Request<4>, at_cycle: Option<u64>) {
         self.sequence += 1;
         assert!(self.enqueue(1, self.sequence, request, at_cycle));

@@ -128,7 +128,7 @@ fn the_fallback_acts_until_the_motors_brake_as_on_a_real_arm() {
     }
     motors.cycle(None);
     assert_eq!(motors.drives(), Drives::Idle);
-    assert_eq!(motors.loss(), Some(LossReason::Answer));
+    assert_eq!(motors.loss(), Some(LossReason::NoAnswer));
     // After a loss of answers the controller must be idle before its torque is applied again.
     for _ in 0..5 {
         motors.cycle(Some(&hold));

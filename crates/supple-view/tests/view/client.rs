@@ -1,4 +1,4 @@
-//! A browser in miniature: HTTP requests and a WebSocket, with headers as the test wants them.
+//! Test client: HTTP requests and a WebSocket with arbitrary headers.
 
 use serde_json::Value;
 use std::io::{Read, Write};
@@ -7,10 +7,10 @@ use std::time::{Duration, Instant};
 use tungstenite::protocol::Role;
 use tungstenite::{Error, Message, WebSocket};
 
-/// How long a test waits for something that must come.
+/// Timeout of a message that must arrive.
 const MESSAGE_TIMEOUT: Duration = Duration::from_secs(60);
 
-/// Address and path of a URL such as `http://127.0.0.1:4000/token/`.
+/// Splits a URL into address and path, such as `http://127.0.0.1:4000/token/`.
 pub fn split(url: &str) -> (String, String) {
     let rest = url.split_once("://").expect("a scheme").1;
     let (address, path) = rest.split_once('/').expect("a path");
@@ -32,20 +32,20 @@ pub fn get(address: &str, path: &str, headers: &str) -> (u16, String) {
     (status.expect("a status"), body.to_owned())
 }
 
-/// As [`get`], of this URL with its own host.
+/// Requests a URL as [`get`] does, with the host of the URL.
 pub fn get_url(url: &str) -> (u16, String) {
     let (address, path) = split(url);
     get(&address, &path, &format!("Host: {address}\r\n"))
 }
 
-/// A viewer that is connected.
+/// A connected viewer.
 pub struct Client(WebSocket<TcpStream>);
 
 impl Client {
-    /// Connects with further header lines, such as an origin.
+    /// Connects with additional header lines, such as an origin.
     ///
     /// # Errors
-    /// The status of an answer that is no upgrade.
+    /// The status of a response that is not an upgrade.
     pub fn connect(url: &str, headers: &str) -> Result<Client, u16> {
         let (address, path) = split(url);
         let mut stream = TcpStream::connect(&address).expect("a server");
@@ -88,7 +88,7 @@ impl Client {
         self.0.send(message).expect("sent");
     }
 
-    /// The next message that `wanted` turns into something; `meanwhile` runs between messages.
+    /// Waits for the next message for which `wanted` returns a value, and returns it; calls `meanwhile` between messages.
     pub fn wait_for<T>(
         &mut self,
         meanwhile: &mut dyn FnMut(),
@@ -100,7 +100,7 @@ impl Client {
         loop {
             assert!(
                 start.elapsed() < MESSAGE_TIMEOUT,
-                "the message did not come"
+                "the message did not arrive"
             );
             meanwhile();
             match self.0.read() {
@@ -115,7 +115,7 @@ impl Client {
         }
     }
 
-    /// The next text with this operation.
+    /// Waits for the next text message with this operation.
     pub fn wait_for_op(&mut self, meanwhile: &mut dyn FnMut(), op: &str) -> Value {
         self.wait_for(meanwhile, |message| {
             let Message::Text(text) = message else {
@@ -126,7 +126,7 @@ impl Client {
         })
     }
 
-    /// The payload of the next message of this subscription.
+    /// Waits for the next message of this subscription and returns its payload.
     pub fn wait_for_data(&mut self, meanwhile: &mut dyn FnMut(), subscription: u32) -> Vec<u8> {
         self.wait_for(meanwhile, |message| {
             let Message::Binary(bytes) = message else {
@@ -137,7 +137,7 @@ impl Client {
         })
     }
 
-    /// Calls the service; the reply, or the message of its failure.
+    /// Calls the service; returns the reply, or the error message.
     pub fn call(&mut self, meanwhile: &mut dyn FnMut(), command: &Value) -> Result<Value, String> {
         self.begin_call(77, command);
         let (call, answer) = self.wait_for_answer(meanwhile);
@@ -145,7 +145,7 @@ impl Client {
         answer
     }
 
-    /// Calls the service under this id and does not wait.
+    /// Calls the service with this call id, without waiting for the answer.
     pub fn begin_call(&mut self, call: u8, command: &Value) {
         let mut bytes = vec![2, 1, 0, 0, 0, call, 0, 0, 0, 4, 0, 0, 0];
         bytes.extend_from_slice(b"json");
@@ -153,7 +153,7 @@ impl Client {
         self.0.send(Message::binary(bytes)).expect("sent");
     }
 
-    /// The next answer to any call, with the id of the call.
+    /// Waits for the next answer to any call; returns it with the id of the call.
     pub fn wait_for_answer(&mut self, meanwhile: &mut dyn FnMut()) -> (u64, Result<Value, String>) {
         self.wait_for(meanwhile, |message| match message {
             Message::Binary(bytes) if bytes[0] == 3 => {
@@ -173,7 +173,7 @@ impl Client {
         })
     }
 
-    /// Port of this end.
+    /// Returns the port of this side of the connection.
     pub fn port(&self) -> u16 {
         let address = self.0.get_ref().local_addr();
         address.expect("an address").port()

@@ -1,4 +1,4 @@
-//! A scripted controller: publishes telemetry, takes gains into force, and refuses more than 500 N/m.
+//! A scripted controller, which publishes telemetry, applies new gains, and refuses a stiffness above 500 N/m.
 
 use core::cell::{Cell, RefCell};
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -15,19 +15,19 @@ use supple_realtime::{Stop, pause};
 use supple_view::{Addresses, Options, Source};
 use tempfile::TempDir;
 
-/// Joints of the arm.
+/// Number of joints of the arm.
 pub const N: usize = 4;
-/// Most stiffness that the controller accepts \[N/m\].
+/// Maximum stiffness that the controller accepts \[N/m\].
 pub const MAX_STIFFNESS: f64 = 500.0;
 
-/// A controller and its page.
+/// A scripted controller and the server of its page.
 pub struct System {
     server: OperatorServer,
     domain: Domain,
     cycle: Cell<u64>,
     stiffness: Cell<[f64; 3]>,
     idle: RefCell<IdleServer>,
-    /// Whether it reads no operator's requests, as a controller whose helper hangs.
+    /// Whether the controller ignores the requests of operators, like a controller whose helper thread hangs.
     pub mute: Cell<bool>,
     stop: Stop,
     view: Option<JoinHandle<()>>,
@@ -35,12 +35,12 @@ pub struct System {
 }
 
 impl System {
-    /// Starts both.
+    /// Starts the controller and the server.
     pub fn start(options: Options) -> (System, Addresses) {
         let folder = tempfile::tempdir().expect("a folder");
         static SYSTEMS: AtomicU32 = AtomicU32::new(0);
         let number = SYSTEMS.fetch_add(1, Ordering::Relaxed);
-        // The folder of an emulated arm's bus depends on this name alone.
+        // The folder of an emulated arm's bus depends only on this name.
         let prefix = format!("view-{}-{number}", std::process::id());
         let domain = Domain::in_folder(&folder.path().join("run"), &prefix).expect("a domain");
         let server = OperatorServer::new(&domain, Backpressure::Drop).expect("a controller");
@@ -69,7 +69,7 @@ impl System {
         (system, addresses.expect("the page's address"))
     }
 
-    /// The system.
+    /// Returns the namespace of the system.
     pub fn domain(&self) -> &Domain {
         &self.domain
     }
@@ -79,7 +79,7 @@ impl System {
         self.cycle.get()
     }
 
-    /// A cycle: telemetry, and requests.
+    /// Runs one cycle: publishes telemetry and answers requests.
     pub fn step(&self) {
         let cycle = self.cycle.get();
         self.cycle.set(cycle + 1);
@@ -108,7 +108,7 @@ impl System {
         while !self.mute.get()
             && let Some(message) = self.server.request().expect("a request")
         {
-            let request = message.request::<N>().expect("for this arm");
+            let request = message.request::<N>().expect("the request is for this arm");
             let refused = match request {
                 Some(Request::Gains { gains, .. }) => {
                     let wanted: [f64; 3] = gains.stiffness_n_per_m.into();

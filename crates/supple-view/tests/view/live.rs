@@ -1,11 +1,11 @@
-//! A running system: snapshots, the channels of a log, commands, and viewers that do not read.
+//! Tests of the page of a running system: snapshots, channels of a log, and commands.
 
 use crate::client::{Client, get_url};
 use crate::controller::System;
 use serde_json::{Value, json};
 use supple_view::Options;
 
-/// Id of the channel of this topic.
+/// Returns the id of the channel with this topic.
 fn channel(advertised: &Value, topic: &str) -> Value {
     let channels = advertised["channels"].as_array().expect("channels");
     let found = channels.iter().find(|channel| channel["topic"] == topic);
@@ -17,14 +17,14 @@ pub fn subscribe(client: &mut Client, advertised: &Value, id: u32, topic: &str) 
     client.send(&json!({"op": "subscribe", "subscriptions": [{"id": id, "channelId": channel}]}));
 }
 
-/// The next snapshot.
+/// Waits for the next snapshot.
 fn snapshot(client: &mut Client, system: &System) -> Value {
     let bytes = client.wait_for_data(&mut || system.step(), 9);
     serde_json::from_slice(&bytes).expect("JSON")
 }
 
 #[test]
-fn a_viewer_sees_the_arm_move_and_a_new_stiffness_comes_back_from_the_controller() {
+fn snapshots_show_the_motion_and_a_new_stiffness_that_the_controller_applied() {
     let (system, addresses) = System::start(Options::default());
     let (status, info) = get_url(&format!("{}info.json", addresses.url));
     let info: Value = serde_json::from_str(&info).expect("JSON");
@@ -54,7 +54,7 @@ fn a_viewer_sees_the_arm_move_and_a_new_stiffness_comes_back_from_the_controller
     }
     let after = snapshot(&mut client, &system);
     assert_eq!(after["stiffness_n_per_m"], json!([12.0, 12.0, 12.0]));
-    // What was not asked for stays.
+    // The gains that the command does not contain stay.
     assert_eq!(after["damping_n_s_per_m"], json!([8.0, 8.0, 8.0]));
 
     let gains = json!({"request": "gains", "stiffness_n_per_m": [900.0, 12.0, 12.0]});
@@ -65,7 +65,7 @@ fn a_viewer_sees_the_arm_move_and_a_new_stiffness_comes_back_from_the_controller
 }
 
 #[test]
-fn stock_viewers_get_the_channels_of_a_log_and_set_parameters() {
+fn foxglove_viewers_get_the_channels_of_a_log_and_set_parameters() {
     let (system, addresses) = System::start(Options::default());
     let mut client =
         Client::connect(&addresses.foxglove_url, "Origin: file://\r\n").expect("accepted");
@@ -117,7 +117,7 @@ fn stock_viewers_get_the_channels_of_a_log_and_set_parameters() {
 }
 
 #[test]
-fn a_page_that_only_shows_refuses_commands() {
+fn a_read_only_page_refuses_commands() {
     let (system, addresses) = System::start(Options {
         read_only: true,
         ..Options::default()

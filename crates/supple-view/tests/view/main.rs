@@ -1,4 +1,4 @@
-//! The server against a scripted controller on real shared memory, and a client of its protocols byte by byte.
+//! Tests of the server with a scripted controller on shared memory, and with a client that implements its protocols.
 
 mod client;
 mod controller;

@@ -1,4 +1,4 @@
-//! Idle and the emergency stop pass a command of the same page that nobody answers.
+//! Tests that an unanswered command delays neither idle nor the emergency stop of the same page.
 
 use crate::client::Client;
 use crate::controller::System;
@@ -9,14 +9,14 @@ use supple_bus::Address;
 use supple_ipc::Domain;
 use supple_view::Options;
 
-/// A pendant that takes presses but answers only that of the emergency stop; removed with its folder.
+/// A pendant that answers only a press of the emergency stop; dropping this value removes it and its folder.
 struct Pendant(std::path::PathBuf);
 
 impl Pendant {
     fn new(domain: &Domain) -> Pendant {
         let address = Address::of_system(domain.prefix()).expect("a folder");
         let Address::Folder(folder) = address else {
-            panic!("sockets are in a folder");
+            panic!("the address of the bus is a folder");
         };
         std::fs::create_dir(&folder).expect("a folder");
         let listener = UnixListener::bind(folder.join("pendant")).expect("a socket");
@@ -43,12 +43,12 @@ impl Drop for Pendant {
     }
 }
 
-fn calls_pass(options: &Options, first: &[Value], urgent: &Value, mode: &str) {
+fn urgent_call_is_answered(options: &Options, first: &[Value], urgent: &Value, mode: &str) {
     let (system, addresses) = System::start(options.clone());
     let _pendant = Pendant::new(system.domain());
     let mut client = Client::connect(&addresses.foxglove_url, "").expect("accepted");
     client.wait_for_op(&mut || system.step(), "advertiseServices");
-    // The page has telemetry, so that its commands reach the controller.
+    // The page has received telemetry, so that its commands reach the controller.
     for _ in 0..200 {
         system.step();
     }
@@ -60,7 +60,7 @@ fn calls_pass(options: &Options, first: &[Value], urgent: &Value, mode: &str) {
     let (call, answer) = client.wait_for_answer(&mut || system.step());
     assert_eq!(call, 2, "{urgent} waited behind {first:?}: {answer:?}");
     assert_eq!(answer, Ok(json!({"accepted": true, "mode": mode})));
-    // The others are answered too, if only with that nobody does.
+    // The other commands are answered too, with the error that the controller or the pendant does not answer.
     for _ in first {
         let (call, answer) = client.wait_for_answer(&mut || system.step());
         assert_eq!(call, 1);
@@ -73,9 +73,9 @@ fn pendant(button: &str) -> Value {
 }
 
 #[test]
-fn idle_passes_commands_that_nobody_answers() {
+fn idle_is_answered_while_other_commands_are_unanswered() {
     let first = [json!({"request": "reset"}), pendant("activate")];
-    calls_pass(
+    urgent_call_is_answered(
         &Options::default(),
         &first,
         &json!({"request": "idle"}),
@@ -84,7 +84,7 @@ fn idle_passes_commands_that_nobody_answers() {
 }
 
 #[test]
-fn the_emergency_stop_passes_commands_that_nobody_answers() {
+fn the_emergency_stop_is_answered_while_other_commands_are_unanswered() {
     let first = [json!({"request": "hold_tip"}), pendant("release")];
-    calls_pass(&Options::default(), &first, &pendant("e-stop"), "pendant");
+    urgent_call_is_answered(&Options::default(), &first, &pendant("e-stop"), "pendant");
 }

@@ -1,4 +1,4 @@
-//! A log: every second of it is there, peaks included.
+//! Tests of the page of a log: its snapshots cover the whole log, including peaks.
 
 use crate::client::get_url;
 use crate::controller::N;
@@ -11,9 +11,9 @@ use supple_model::Description;
 use supple_realtime::Stop;
 use supple_view::{Options, Source};
 
-/// Cycles of the log, at 1 kHz.
+/// Number of cycles of the log, at 1 kHz.
 const CYCLES: u64 = 3000;
-/// Cycle in which alone a force acts.
+/// Only cycle in which a force acts.
 const IMPACT: u64 = 1234;
 
 #[test]

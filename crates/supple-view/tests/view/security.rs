@@ -1,4 +1,4 @@
-//! Who may see and command: the token, the host, the origin, and bytes that are no request.
+//! Tests of the access check: token, host, origin, and bytes that are not a request.
 
 use crate::client::{Client, get, get_url, split};
 use crate::controller::System;
@@ -7,7 +7,7 @@ use std::net::TcpStream;
 use supple_view::Options;
 
 #[test]
-fn neither_page_nor_data_nor_commands_open_without_the_token() {
+fn page_data_and_commands_require_the_token() {
     let (system, addresses) = System::start(Options::default());
     system.step();
     let (address, path) = split(&addresses.url);
@@ -21,7 +21,7 @@ fn neither_page_nor_data_nor_commands_open_without_the_token() {
         );
         assert_eq!(get(&address, &format!("/{name}"), &host).0, 403, "{name}");
     }
-    // A guess of the right length.
+    // A wrong token of the right length.
     let guess = format!("/{}/", "0".repeat(path.len() - 2));
     assert_eq!(get(&address, &guess, &host).0, 403);
     assert_eq!(get(&address, &format!("{guess}ws"), &host).0, 403);
@@ -37,7 +37,7 @@ fn another_site_in_the_same_browser_cannot_connect() {
         ..Options::default()
     });
     let (address, path) = split(&addresses.url);
-    // A name that was made to resolve to 127.0.0.1 reaches the port, but names itself in the request.
+    // A request to another name that resolves to 127.0.0.1 reaches the port, but contains that name as host.
     let port = address.split(':').nth(1).expect("a port");
     let rebound = format!("Host: evil.example:{port}\r\n");
     assert_eq!(get(&address, &path, &rebound).0, 403);
@@ -54,7 +54,7 @@ fn another_site_in_the_same_browser_cannot_connect() {
 }
 
 #[test]
-fn bytes_that_are_no_request_end_a_connection_and_nothing_else() {
+fn invalid_bytes_end_only_their_connection() {
     let (_system, addresses) = System::start(Options::default());
     let (address, _) = split(&addresses.url);
     let long = [b"GET /".to_vec(), vec![b'a'; 20_000]].concat();
@@ -65,7 +65,7 @@ fn bytes_that_are_no_request_end_a_connection_and_nothing_else() {
         &long,
     ] {
         let mut stream = TcpStream::connect(&address).expect("a server");
-        // The server may close before all is sent.
+        // The server may close the connection before all bytes are sent.
         let _ = stream.write_all(bytes);
         let _ = stream.shutdown(std::net::Shutdown::Write);
         let mut answer = Vec::new();

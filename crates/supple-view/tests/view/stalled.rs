@@ -1,4 +1,4 @@
-//! Viewers that never read, with more data for them than the kernel holds.
+//! Tests with viewers that never read, with more data for them than the buffers of the kernel hold.
 
 use crate::client::{Client, split};
 use crate::controller::System;
@@ -7,27 +7,27 @@ use serde_json::json;
 use supple_ipc::TelemetryReader;
 use supple_view::Options;
 
-/// Descriptions of the arm that a stalled viewer asks for: some 5 MB, more than the two buffers of a connection hold.
+/// Number of descriptions of the arm that a stalled viewer requests: some 5 MB, more than both buffers of a connection hold.
 const DESCRIPTIONS: usize = 1000;
-/// Snapshots that another viewer must get while a connection is stuck.
+/// Number of snapshots that another viewer must receive while a connection is blocked.
 const SNAPSHOTS: usize = 10;
 
-/// What the kernel reports of one end of a connection.
+/// State of one side of a connection, from the kernel's table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Sending {
+struct SendState {
     established: bool,
     unsent_bytes: u64,
 }
 
-/// The server's end of the connection to this port, from the kernel's table.
-fn server_end(server: u16, client: u16) -> Option<Sending> {
+/// Returns the state of the server's side of the connection to this port.
+fn server_end(server: u16, client: u16) -> Option<SendState> {
     let table = std::fs::read_to_string("/proc/self/net/tcp").expect("the kernel's table");
     let ends = (format!(":{server:04X}"), format!(":{client:04X}"));
     table.lines().skip(1).find_map(|line| {
         let fields: Vec<&str> = line.split_whitespace().collect();
         let of_this = fields[1].ends_with(&ends.0) && fields[2].ends_with(&ends.1);
         let unsent = fields[4].split(':').next().unwrap_or_default();
-        of_this.then(|| Sending {
+        of_this.then(|| SendState {
             established: fields[3] == "01",
             unsent_bytes: u64::from_str_radix(unsent, 16).expect("a number"),
         })
@@ -35,14 +35,14 @@ fn server_end(server: u16, client: u16) -> Option<Sending> {
 }
 
 #[test]
-fn a_viewer_that_never_reads_holds_up_neither_the_controller_nor_the_others() {
+fn a_viewer_that_never_reads_delays_neither_the_controller_nor_other_viewers() {
     let (system, addresses) = System::start(Options::default());
     let server: u16 = split(&addresses.url)
         .0
         .rsplit_once(':')
         .and_then(|(_, port)| port.parse().ok())
         .expect("a port");
-    // As another reader of the same telemetry sees it: nothing is lost while the viewers stall.
+    // Another reader of the same telemetry loses nothing while the viewers are stalled.
     let mut reader = TelemetryReader::new(system.domain()).expect("a reader");
     let mut received = 0_u64;
     let before = system.cycles();
@@ -70,8 +70,8 @@ fn a_viewer_that_never_reads_holds_up_neither_the_controller_nor_the_others() {
             client
         })
         .collect();
-    // Stuck: the kernel holds bytes for the viewer, and from one snapshot of the other viewer to the next it neither
-    // gets rid of any nor is given more, although there is always more for it.
+    // A connection is blocked if the kernel holds bytes for the viewer, and their number does not change between two
+    // snapshots of the other viewer, although more data are always waiting.
     let mut last = [None; 3];
     let mut stuck_snapshots = [0; 3];
     let mut dropped = [false; 3];
@@ -79,7 +79,7 @@ fn a_viewer_that_never_reads_holds_up_neither_the_controller_nor_the_others() {
         watching.wait_for_data(&mut step, 9);
         for (index, client) in stalled.iter().enumerate() {
             let now = server_end(server, client.port());
-            let stuck = |end: Sending| end.established && end.unsent_bytes > 0;
+            let stuck = |end: SendState| end.established && end.unsent_bytes > 0;
             if now.is_some_and(stuck) && now == last[index] {
                 stuck_snapshots[index] += 1;
             }
@@ -90,7 +90,7 @@ fn a_viewer_that_never_reads_holds_up_neither_the_controller_nor_the_others() {
     for snapshots in stuck_snapshots {
         assert!(snapshots >= SNAPSHOTS, "{stuck_snapshots:?} snapshots");
     }
-    // It goes on when they have been given up.
+    // The system continues after the server has disconnected the stalled viewers.
     watching.wait_for_data(&mut step, 9);
     let gains = json!({"request": "gains", "stiffness_n_per_m": [12.0, 12.0, 12.0]});
     assert!(watching.call(&mut step, &gains).is_ok());

@@ -1,4 +1,4 @@
-//! `supple calibrate --plant ..`: from an arm to its model, on a simulated, an emulated or a real arm.
+//! `supple calibrate --plant ..`: calibrates the model of a simulated, an emulated or a real arm.
 //!
 //! The steps are those of [`supple_experiment::procedure`]; this module starts the processes and sends requests to them.
 
@@ -29,13 +29,13 @@ use supple_plant::PlantOptions;
 use supple_plant::options::SETS;
 use terminal::Terminal;
 
-/// Options of the simulated arm, with their seed.
+/// Name of the file with the options of the simulated arm and their seed.
 const PLANT_OPTIONS: &str = "plant.toml";
 
 /// Runs `supple calibrate` with `--plant`.
 ///
 /// # Errors
-/// [`Failure`]; what is finished stays finished, see `--resume`.
+/// [`Failure`]; the results of finished steps are kept, see `--resume`.
 pub fn run(args: &CalibrateArgs, on: CalibrationPlant) -> Result<(), Failure> {
     let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     let found = with_dof!(arm.dof(), N => sized::<N>(&arm, args, on))??;
@@ -90,7 +90,7 @@ fn sized<const N: usize>(
     let ended = running.end();
     if result.is_err() {
         print_status(&format!(
-            "what is finished is in {}; --resume goes on after it",
+            "the results of the finished steps are in {}; --resume continues after them",
             args.out.display()
         ));
     }
@@ -98,7 +98,7 @@ fn sized<const N: usize>(
     ended.map(|()| found)
 }
 
-/// Every rotor inertia too large by this fraction, or too small by as much; the seed decides which.
+/// Returns the arm with every rotor inertia too large or too small by this fraction; the seed determines the signs.
 fn with_inertia_error<const N: usize>(
     arm: &Arm<N>,
     fraction: f64,
@@ -121,7 +121,7 @@ fn with_inertia_error<const N: usize>(
     Ok(changed?)
 }
 
-/// The model that the calibration starts from: `--model`, or the arm itself, with the errors of `--start-error`.
+/// Returns the model from which the calibration starts: `--model`, or the arm itself, with the errors of `--start-error`.
 fn start_model<const N: usize>(
     arm: &Description,
     args: &CalibrateArgs,
@@ -163,7 +163,7 @@ fn start_model<const N: usize>(
     })?)
 }
 
-/// The system to start. The emulated arm draws the signs and phases of its effects from the seed.
+/// Returns the arguments of the system to start. The emulated arm draws the signs and phases of its effects from the seed.
 fn up_args(
     arm: &Description,
     args: &CalibrateArgs,
@@ -202,7 +202,7 @@ fn up_args(
     })
 }
 
-/// The options of the plant with the seed: a file in the folder of the results.
+/// Writes the options of the plant with the seed to a file in the folder of the results.
 fn seeded(arm: &Description, args: &CalibrateArgs) -> Result<PlantArgs, Failure> {
     let options = args.plant.options(arm)?;
     let file = args.plant.plant_options.as_deref();
@@ -227,7 +227,7 @@ fn seeded(arm: &Description, args: &CalibrateArgs) -> Result<PlantArgs, Failure>
     })
 }
 
-/// The absolute path of a file; the name of a built-in set as it is.
+/// Returns the absolute path of a file; returns the name of a built-in set unchanged.
 fn absolute(file: &Path) -> PathBuf {
     file.canonicalize().unwrap_or_else(|_| file.to_owned())
 }

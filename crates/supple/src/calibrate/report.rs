@@ -1,4 +1,4 @@
-//! What a calibration found, for the terminal.
+//! Prints the result of a calibration on the terminal.
 
 use std::path::Path;
 use supple_cli::console::{print_json, print_line};

@@ -1,4 +1,4 @@
-//! An arm whose controller and plant are processes.
+//! Calibration arm whose controller and plant are processes.
 
 use crate::cli::{PlantKind, UpArgs};
 use crate::operate::OperatorSession;
@@ -22,23 +22,23 @@ use supple_model::Description;
 use supple_plant::PlantOptions;
 use supple_realtime::{Stop, pause};
 
-/// Folder of the model that the controller is started with, within that of the results.
+/// Name of the folder for the model of the controller, in the folder of the results.
 const MODEL: &str = "controller";
 /// Timeout for a process to join, for a reply and for telemetry.
 const TIMEOUT: Duration = Duration::from_secs(20);
-/// Time that an arm without a pendant may take to become active \[s\], and the number of attempts: all of them outlast
-/// the lowering of the arm, which takes some ten seconds.
+/// Timeout for an arm without a pendant to become active \[s\], and number of attempts. All attempts together take longer
+/// than laying the arm down, which takes some ten seconds.
 const ENABLING_S: f64 = 1.0;
 const ENABLING_ATTEMPTS: usize = 40;
 /// Timeout for an operator to activate a real arm.
 const ACTIVATION_TIMEOUT: Duration = Duration::from_secs(300);
-/// Longest wait for one telemetry.
+/// Maximum duration of one wait for telemetry.
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// Maximum number of messages that may be waiting for this reader.
 const MAX_WAITING: u32 = 20_000;
 /// Time for which a mode is kept before the next change \[s\].
 const SETTLE_S: f64 = 0.2;
-/// Time in which a stopped arm comes to rest \[s\].
+/// Time after which a stopped arm stands still \[s\].
 const REST_S: f64 = 1.5;
 
 /// A system of processes with its arm.
@@ -49,15 +49,15 @@ pub struct RunningArm<const N: usize> {
     session: OperatorSession<N>,
     prefix: String,
     plant: PlantKind,
-    /// Whether this program starts the processes; otherwise they run already.
+    /// Whether this program starts the processes; otherwise the system is already running.
     starts: bool,
-    /// A model was loaded.
+    /// Whether a model has been loaded.
     loaded: bool,
     virtual_time: bool,
     options: PlantOptions,
     folder: PathBuf,
     logs: PathBuf,
-    /// Folder in which the controller keeps the arm with what it has learned.
+    /// Folder in which the controller stores the description of the arm with the learned terms.
     learned: PathBuf,
     model: Description,
     stop: Stop,
@@ -68,10 +68,10 @@ pub struct RunningArm<const N: usize> {
 }
 
 impl<const N: usize> RunningArm<N> {
-    /// Prepares a system; nothing is started yet.
+    /// Prepares a system without starting processes.
     ///
     /// # Errors
-    /// Options that do not fit the plant; shared memory that cannot be used.
+    /// If an option does not fit the plant, or shared memory cannot be used.
     pub fn new(
         args: &UpArgs,
         starts: bool,
@@ -103,11 +103,11 @@ impl<const N: usize> RunningArm<N> {
         })
     }
 
-    /// Ends the processes in order: the controller sets the drives to idle first. Of processes that run already none is
-    /// ended: gravity hold is requested.
+    /// Ends the processes in order: the controller sets the drives to idle first. If the system was already running, requests
+    /// gravity hold and ends no process.
     ///
     /// # Errors
-    /// A process that cannot be waited for; a log that cannot be completed.
+    /// If a process cannot be waited for, or the log cannot be completed.
     pub fn end(&mut self) -> Result<(), Failure> {
         while let Some(telemetry) = self.reader.receive().map_err(Failure::system)? {
             self.last = Some(telemetry);
@@ -117,7 +117,7 @@ impl<const N: usize> RunningArm<N> {
             .as_ref()
             .is_some_and(|last| last.record().mode() == Some(Mode::Idle));
         if !self.starts && self.loaded && !idle {
-            // Nobody ends these processes: what was requested must not go on. The controller may have gone.
+            // The processes continue to run, but the requested motion must end. The controller may have ended.
             let _ = self.session.begin_request(&Request::GravityHold, None);
         }
         let log = self.finish_log();
@@ -141,7 +141,7 @@ impl<const N: usize> RunningArm<N> {
         self.recorder.take().map_or(Ok(()), Recorder::finish)
     }
 
-    /// The next telemetry, if it comes soon; it is in the log.
+    /// Waits briefly for the next telemetry and adds it to the log.
     fn poll(&mut self) -> Result<Option<Telemetry>, Failure> {
         if self.stop.shutdown_requested() {
             return Err(Failure::Interrupted);
@@ -176,7 +176,7 @@ impl<const N: usize> RunningArm<N> {
         Ok(false)
     }
 
-    /// Sends a request, for a cycle or at once. Telemetry is read until a controller is connected.
+    /// Sends a request for a cycle, or for the next one. Reads telemetry until a controller is connected.
     fn begin(&mut self, request: &Request<N>, at_cycle: Option<u64>) -> Result<u64, Failure> {
         let start = Instant::now();
         loop {
@@ -190,8 +190,8 @@ impl<const N: usize> RunningArm<N> {
         }
     }
 
-    /// Waits for the reply to a request, while telemetry is read into `unprocessed`: in virtual time the controller blocks on a
-    /// full queue of telemetry.
+    /// Waits for the reply to a request and reads telemetry into `unprocessed` meanwhile, because in virtual time the controller
+    /// blocks if the queue of telemetry is full.
     fn wait_for_reply(
         &mut self,
         sequence: u64,
@@ -222,15 +222,15 @@ impl<const N: usize> RunningArm<N> {
         self.wait_for_reply(sequence, &mut VecDeque::new())
     }
 
-    /// Requests gravity hold. It is dated to the cycle `unless_idle_since`, if given: the controller refuses it if somebody
-    /// requested idle in that cycle or after it.
+    /// Requests gravity hold. If the cycle `unless_idle_since` is given, the request is for that cycle, so that the controller
+    /// refuses it if an operator requested idle in that cycle or later.
     fn request_gravity_hold(&mut self, unless_idle_since: Option<u64>) -> Result<(), Failure> {
         let reply = self.request_at(&Request::GravityHold, unless_idle_since)?;
         self.gravity_hold_cycle = reply.cycle;
         Ok(())
     }
 
-    /// As [`RunningArm::wait_for`], and fails if somebody requests another mode.
+    /// Waits as [`RunningArm::wait_for`] does, and fails if an operator requests another mode.
     fn wait_in_gravity_hold(
         &mut self,
         within: Duration,
@@ -257,7 +257,7 @@ impl<const N: usize> RunningArm<N> {
         }
     }
 
-    /// Starts the processes, or the controller anew.
+    /// Starts the processes, or restarts the controller.
     fn launch(&mut self) -> Result<(), Failure> {
         let mut controller = self.plan.controller.clone();
         let folder = self.folder.display().to_string();
@@ -288,8 +288,8 @@ impl<const N: usize> RunningArm<N> {
         self.children.start(&self.plan.clock_owner)
     }
 
-    /// An arm without a pendant is active soon after gravity hold wants torque. After a loss, for instance of the
-    /// controller, the plant first lays the arm down, and enables its motors only if idle was requested since.
+    /// Activates an arm without a pendant. It becomes active soon after gravity hold requests torque. After a loss, for example
+    /// of the controller, the plant first lays the arm down, and enables the motors only if idle was requested since then.
     fn activate_without_pendant(
         &mut self,
         mut unless_idle_since: Option<u64>,
@@ -323,7 +323,7 @@ impl<const N: usize> RunningArm<N> {
         Err(Failure::DrivesNotActive)
     }
 
-    /// Active drives in gravity hold, unless somebody requested idle in the given cycle or after it.
+    /// Enters gravity hold and waits until the drives are active, unless an operator requested idle in the given cycle or later.
     fn activate(&mut self, unless_idle_since: Option<u64>) -> Result<(), Failure> {
         if self.plan.lays_down {
             self.activate_without_pendant(unless_idle_since)?;
@@ -418,7 +418,7 @@ impl<const N: usize> RunningArm<N> {
                 if mode.is_some_and(moves_joints) {
                     performed.moved_s += period_s;
                 }
-                // No step requests it: somebody else did.
+                // No step requests this mode: another operator did.
                 if mode == Some(Mode::Idle) {
                     return Err(Failure::OtherMode {
                         mode: Mode::Idle.name(),
@@ -461,14 +461,14 @@ impl<const N: usize> RunningArm<N> {
     }
 }
 
-/// The fault of a cycle that is not before `cycle`: telemetry that waits may be from before a reset.
+/// Returns the fault of a cycle, unless the cycle is before `cycle`: queued telemetry may be from before a reset.
 fn fault_since(telemetry: &Telemetry, cycle: u64) -> Option<String> {
     let record = telemetry.record();
     let faulted = record.fault != 0 && telemetry.state.cycle >= cycle;
     faulted.then(|| record.fault_text.to_string())
 }
 
-/// Whether a fault is what a contact causes; a joint that something holds back exceeds its tracking error.
+/// Whether a contact can cause the fault; a joint that an obstacle holds back exceeds its tracking error.
 fn is_contact(fault: u8) -> bool {
     matches!(
         fault,
@@ -482,7 +482,7 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
     fn load(&mut self, model: &Description) -> Result<(), Failure> {
         model.save(&self.folder)?;
         self.model = model.clone();
-        // Idle that an operator requested of the controller that was just started is not overridden.
+        // An idle request that an operator sent to the new controller is not overridden.
         let unless_idle_since = self.starts.then_some(0);
         if self.starts {
             self.launch()?;
@@ -496,7 +496,7 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
     }
 
     fn position_rad(&mut self) -> Result<Vector<N>, Failure> {
-        // Telemetry may be waiting; the last is the present one.
+        // Telemetry may be queued; the last one has the present position.
         let mut waiting = 0;
         while waiting < MAX_WAITING
             && let Some(telemetry) = self.reader.receive().map_err(Failure::system)?
@@ -526,7 +526,7 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
         )?;
         self.recorder = Some(recorder);
         let performed = self.perform_steps(steps);
-        // The log is whole also after an error.
+        // The log is completed even after an error.
         let finished = self.finish_log();
         let performed = performed?;
         finished.map(|()| performed)
@@ -537,7 +537,7 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
         let rested = from + (REST_S / self.model.settings().period_s) as u64;
         self.wait_for(TIMEOUT, |telemetry| telemetry.state.cycle >= rested)?;
         match self.request(&Request::Reset) {
-            // There is no fault if the drives alone became idle.
+            // If only the drives became idle, there is no fault.
             Ok(_) | Err(Failure::Refused { .. }) => {}
             Err(failure) => return Err(failure),
         }
@@ -550,7 +550,7 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
             return Ok(None);
         }
         let kept = Description::load(file)?;
-        // A system that runs already may have learned with another model.
+        // A system that was already running may have learned with another model.
         if kept.urdf() != self.model.urdf() || kept.friction() != self.model.friction() {
             return Ok(None);
         }

@@ -1,14 +1,14 @@
-//! The person at the terminal: progress, and the question before the arm moves.
+//! Interaction with the operator on the terminal: progress, and the question before the arm moves.
 
 use std::path::Path;
-use supple_cli::console::{confirms, print_status};
+use supple_cli::console::{confirm, print_status};
 use supple_experiment::procedure::{Operator, Sweep};
 
-/// Standard error for progress, standard input for the answer.
+/// Operator on the terminal: writes progress to standard error and reads the answer from standard input.
 pub struct Terminal {
-    /// Whether the swept space is confirmed beforehand.
+    /// Whether the swept space has been confirmed on the command line.
     pub yes: bool,
-    /// No progress.
+    /// Whether to print no progress.
     pub quiet: bool,
 }
 
@@ -23,7 +23,7 @@ impl Operator for Terminal {
         if self.yes {
             return true;
         }
-        confirms(&format!(
+        confirm(&format!(
             "is the space of {} free, and the emergency stop within reach?",
             drawing.display()
         ))

@@ -1,4 +1,4 @@
-//! The checks; each is a function of the machine's files.
+//! The checks of the machine; each reads only files.
 
 use super::machine::Machine;
 use serde::Serialize;
@@ -19,9 +19,9 @@ const ARPHRD_CAN: i64 = 280;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Verdict {
-    /// Requirement met.
+    /// The requirement is met.
     Pass,
-    /// Not ideal, or not determined: cycles may be late, or a CAN bus cannot be used.
+    /// The result is not ideal or unknown: cycles may be late, or a CAN bus cannot be used.
     Warn,
     /// The real-time requirements are not met.
     Fail,
@@ -30,7 +30,7 @@ pub enum Verdict {
 /// Result of a check.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Check {
-    /// Short name, stable.
+    /// Short name, which does not change between versions.
     pub name: &'static str,
     /// Verdict.
     pub verdict: Verdict,
@@ -112,7 +112,7 @@ fn kernel(machine: &Machine) -> Check {
     Check::warn(
         NAME,
         format!("{release}, not PREEMPT_RT"),
-        "install a realtime kernel (Debian: linux-image-rt-amd64); latencies then have a bound",
+        "install a realtime kernel (Debian: linux-image-rt-amd64), which bounds the latencies",
     )
 }
 
@@ -138,13 +138,13 @@ fn throttling(machine: &Machine) -> Check {
         Some(-1) => Check::pass(NAME, "off"),
         Some(0) => Check::fail(
             NAME,
-            "realtime threads get no time (sched_rt_runtime_us = 0)",
+            "realtime threads get no processor time (sched_rt_runtime_us = 0)",
             "sysctl kernel.sched_rt_runtime_us=950000",
         ),
         Some(runtime_us) => Check::pass(
             NAME,
             format!(
-                "after {runtime_us} us of each scheduler period; the control thread idles for much longer than the rest"
+                "after {runtime_us} us of each scheduler period; the control thread sleeps for much longer than the remaining time"
             ),
         ),
         None => Check::warn(

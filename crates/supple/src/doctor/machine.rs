@@ -9,7 +9,7 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// Machine whose files are below `root`.
+    /// Creates the access to a machine whose files are below `root`.
     pub fn new(root: &Path) -> Machine {
         Machine {
             root: root.to_owned(),
@@ -42,7 +42,7 @@ impl Machine {
         names
     }
 
-    /// A limit of this process, as `/proc/self/limits` names it: `None` in the `Option` is unlimited.
+    /// Returns a limit of this process by its name in `/proc/self/limits`; the inner `None` means unlimited, the outer unknown.
     pub fn limit(&self, name: &str) -> Option<Option<u64>> {
         let limits = self.read("proc/self/limits")?;
         let line = limits.lines().find(|line| line.starts_with(name))?;

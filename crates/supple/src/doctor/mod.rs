@@ -1,7 +1,7 @@
 //! `supple doctor`: checks whether this machine can run the arm in real time, and prints a remedy for each check
 //! that did not pass.
 //!
-//! Read-only: it changes, writes and sends nothing. To look for the Python package it runs the interpreter.
+//! The command changes no setting, writes no file and sends no data. To find the Python package, it runs the interpreter.
 
 mod checks;
 mod machine;

@@ -1,10 +1,10 @@
-//! Whether Python and the package `supple` are there, of the version of this program.
+//! Checks whether Python and the package `supple` are installed, in the version of this program.
 
 use super::checks::Check;
 use std::process::{Command, Stdio};
 
 const NAME: &str = "python";
-/// Prints the version of Python, and that of the package or nothing.
+/// Python program that prints the version of Python, and of the package if it is installed.
 const SCRIPT: &str = "import sys
 print('.'.join(str(part) for part in sys.version_info[:3]))
 try:
@@ -15,7 +15,7 @@ except ImportError:
 /// Oldest version that the package supports.
 const OLDEST: (u32, u32) = (3, 11);
 
-/// Checks the interpreter of this name. Nothing but the package itself needs it, so that nothing of it fails.
+/// Checks the interpreter of this name. The result is at most a warning, because only the package needs Python.
 pub fn check(interpreter: &str) -> Check {
     let ran = Command::new(interpreter)
         .args(["-B", "-c", SCRIPT])
@@ -24,7 +24,7 @@ pub fn check(interpreter: &str) -> Check {
     let Ok(output) = ran else {
         return Check::warn(
             NAME,
-            format!("no {interpreter}; the programs need none"),
+            format!("{interpreter} is not installed; the programs do not need it"),
             "install Python 3.11 or later to use the package `supple`",
         );
     };
@@ -48,11 +48,13 @@ pub fn check(interpreter: &str) -> Check {
                 "{interpreter} {version}, supple {package}; this program is {}",
                 env!("CARGO_PKG_VERSION")
             ),
-            "pip install the package of this version; others cannot connect to its systems",
+            "install the package of this version with pip; other versions cannot connect to the systems of this program",
         ),
         None => Check::warn(
             NAME,
-            format!("{interpreter} {version} without the package supple; the programs need none"),
+            format!(
+                "{interpreter} {version} without the package supple; the programs do not need it"
+            ),
             "pip install ./python",
         ),
     }

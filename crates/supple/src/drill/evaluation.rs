@@ -5,10 +5,10 @@ use super::observable::is_of_sensors;
 use super::spec::{DriveShutdown, Event, Expected, Spec, TestTask};
 use supple_plant::InjectionKind;
 
-/// Maximum ratio of the peak kinetic energy from the fault until 10 ms after braking began to that at the fault, or before it if that
-/// was more. The excess is what a reversed or dead motor can add before it is detected.
+/// Maximum ratio of two kinetic energies: the peak from the fault until 10 ms after braking began, and the larger of the
+/// values at and before the fault. The increase is the energy that a reversed or dead motor can add before it is detected.
 const ENERGY_INCREASE_RATIO: f64 = 1.5;
-/// Kinetic energy of an arm at [`SLOW_M_PER_S`]: an increase to less is no failure \[J\].
+/// Kinetic energy of an arm at [`SLOW_M_PER_S`]; an increase to less than this is no failure \[J\].
 const MIN_ENERGY_BOUND_J: f64 = 0.12;
 
 /// Maximum motion of an arm that descends on shorted motors.
@@ -33,7 +33,7 @@ const POSE_BRAKED_DESCENT: BrakedDescentLimits = BrakedDescentLimits {
     reenabled_m: 0.03,
     tip_m_per_s: 0.16,
 };
-/// The same with the effects of a real arm, whose friction is not that of the model, so that it glides further in gravity hold.
+/// The 7-joint arm with the effects of a real arm, whose friction differs from the model, so that it glides further in gravity hold.
 /// The travel was raised from 30 mm to 50 mm after the first run gave 45 mm.
 const REAL_POSE_BRAKED_DESCENT: BrakedDescentLimits = BrakedDescentLimits {
     reenabled_m: 0.05,
@@ -55,12 +55,12 @@ const FALLING_ROD: f64 = 3.0;
 const GRAVITY_M_PER_S2: f64 = 9.81;
 /// Maximum time for which drives that were activated in a fault are active \[ms\].
 const MAX_ACTIVATED_MS: f64 = 25.0;
-/// Maximum steady pressing force beyond the one of the law \[N\].
+/// Maximum steady pressing force in addition to the force of the law \[N\].
 const MAX_PRESSING_FORCE_N: f64 = 5.0;
 /// Ratio of tip speeds above which the arm counts as accelerated.
 const SPEED_INCREASE_RATIO: f64 = 1.1;
-/// The same if the motors brake: the tip may gain speed from other joints, though the energy falls, by 11 % after a
-/// reversed encoder.
+/// Ratio of tip speeds above which the arm counts as accelerated if the motors brake. The tip may gain speed from other joints
+/// although the energy decreases, by 11 % after a reversed encoder.
 const BRAKING_SPEED_INCREASE_RATIO: f64 = 1.15;
 /// Tip speed that can build up before detection if encoders lag by 20 ms or gravity is reversed: 20 to 40 ms of motor
 /// torque or of twice the weight \[m/s\].
@@ -104,7 +104,7 @@ pub fn evaluate(spec: &Spec, metrics: &RowMetrics, refusals: &[String]) -> (Stri
                 keeps_running || stopped_by(metrics, names),
                 "it neither keeps running nor stops with an expected fault".to_owned(),
             );
-            // Only the faults of sensors have this deadline: a compliant arm may yield to a load or a push without a fault.
+            // Only sensor faults must be detected within this time: a compliant arm may yield to a load or a push without a fault.
             if metrics.observable_after_ms.is_some() && fault_of_sensors(spec) {
                 expect_detection(metrics, names, &mut expect);
             }
@@ -188,7 +188,7 @@ pub fn evaluate(spec: &Spec, metrics: &RowMetrics, refusals: &[String]) -> (Stri
                 format!("fault {:.0} ms after the contact", ms.unwrap_or(f64::NAN)),
             );
         }
-        // While probing or tracking, and with compliant joints, the law itself presses on the block.
+        // In probing, tracking and joint impedance, the law itself presses on the block.
         let pressed_n = metrics.pressed_n.unwrap_or(0.0);
         let expected_n = metrics.law_force_n.unwrap_or(0.0) + metrics.weight_n.unwrap_or(0.0);
         let allowed_n = MAX_PRESSING_FORCE_N + expected_n;
@@ -216,7 +216,7 @@ fn stopped_by(metrics: &RowMetrics, names: &[&str]) -> bool {
     metrics.fault.is_some_and(|fault| names.contains(&fault))
 }
 
-/// Expects one of these faults within the time that detection may take.
+/// Adds a deviation unless one of these faults was detected in time.
 fn expect_detection(metrics: &RowMetrics, names: &[&str], expect: &mut impl FnMut(bool, String)) {
     expect(
         stopped_by(metrics, names) && metrics.detected_after_ms <= Some(MAX_DETECTION_MS),
@@ -226,7 +226,7 @@ fn expect_detection(metrics: &RowMetrics, names: &[&str], expect: &mut impl FnMu
 
 /// Checks that the arm came to rest or braked in time and did not move faster than before.
 fn check_safe_stop(spec: &Spec, metrics: &RowMetrics, expect: &mut impl FnMut(bool, String)) {
-    // Before the fault of a sensor can be observed, nothing can stop the arm.
+    // The arm cannot be stopped before a sensor fault is observable.
     let observable_ms = metrics
         .observable_after_ms
         .filter(|_| fault_of_sensors(spec));
@@ -250,8 +250,8 @@ fn check_safe_stop(spec: &Spec, metrics: &RowMetrics, expect: &mut impl FnMut(bo
     } = spec.event
         && metrics.braked_after_ms.is_some()
     {
-        // An open-circuit motor does not brake; the arm descends on the other motors alone, as a rod that falls at most:
-        // nothing adds energy to what the descent releases.
+        // An open-circuit motor does not brake. The arm descends on the other motors, at most as fast as a falling rod, and gains
+        // no energy except that of the descent.
         let gained_j = metrics.energy_gained_j.unwrap_or(f64::INFINITY);
         expect(
             gained_j <= ENERGY_TOLERANCE_J,
@@ -358,7 +358,7 @@ fn outcome(metrics: &RowMetrics, keeps_running: bool, refusals: &[String]) -> St
 #[cfg(test)]
 mod tests {
     use super::super::metrics::{ControllerSample, RowMetrics};
-    use super::super::spec::When;
+    use super::super::spec::FaultTime;
     use super::super::trace::TraceRow;
     use super::*;
     use crate::cli::PlantKind;
@@ -411,7 +411,7 @@ mod tests {
 
     fn stuck(expected: Expected) -> Spec {
         let kind = InjectionKind::EncoderStuck { joint: None };
-        let when = When::InTheTask(0);
+        let when = FaultTime::InTheTask(0);
         spec(Event::Injected { kind, when }, expected)
     }
 
@@ -498,9 +498,9 @@ mod tests {
         );
     }
 
-    /// A fault that comes late is judged from the moment at which it could be observed.
+    /// A late detection is measured from the time at which the fault became observable.
     #[test]
-    fn detection_is_judged_from_the_moment_of_being_observable() {
+    fn detection_time_counts_from_when_the_fault_is_observable() {
         let mut metrics = run(15, |_, _| {});
         metrics.observable_at(Some(1040 * MS), 1000 * MS);
         assert_eq!(metrics.detected_after_ms, Some(10.0));
@@ -514,7 +514,7 @@ mod tests {
     }
 
     #[test]
-    fn a_law_may_press_with_its_own_force_and_no_more() {
+    fn a_pressing_force_above_that_of_the_law_fails() {
         let pressing = |pressed_n: f64| {
             let mut metrics = run(0, move |ms, line| {
                 line.force_n = if ms >= 1040 { pressed_n } else { 0.0 };
@@ -528,9 +528,9 @@ mod tests {
     }
 
     #[test]
-    fn a_dead_motor_may_release_what_the_descent_gives() {
+    fn a_dead_motor_may_gain_only_the_energy_of_the_descent() {
         let kind = InjectionKind::MotorDead { motor: 1 };
-        let when = When::InTheTask(0);
+        let when = FaultTime::InTheTask(0);
         let dead = |energy_j: f64, tip_m_per_s: f64| {
             let mut metrics = run(15, |ms, line| line.active = ms < 1060);
             metrics.energy_gained_j = Some(energy_j);

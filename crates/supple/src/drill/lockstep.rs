@@ -4,7 +4,7 @@ use super::evaluation::evaluate;
 use super::metrics::{ControllerSample, RowMetrics};
 use super::observable::observable_ns;
 use super::row::Row;
-use super::spec::{Activation, DriveShutdown, Event, InvalidRequest, Spec, TestTask, When};
+use super::spec::{Activation, DriveShutdown, Event, FaultTime, InvalidRequest, Spec, TestTask};
 use super::task::{Script, law_force_n, weight_n};
 use super::test_arms::TestArm;
 use super::trace::{self, TraceRow};
@@ -23,9 +23,9 @@ use supple_plant::{Injection, InjectionKind, Trigger};
 /// Vertical clearance between the start of the trajectory (height 0) and the top face of the block, without the cap
 /// radius \[m\].
 const BLOCK_CLEARANCE_M: f64 = 0.05;
-/// The same for an arm that is only pushed and does not travel far \[m\].
+/// Vertical clearance for an arm that is only pushed and does not travel far \[m\].
 const PUSHED_BLOCK_CLEARANCE_M: f64 = 0.01;
-/// The same for the ramp of the breakaway task \[m\].
+/// Vertical clearance for the ramp of the breakaway task \[m\].
 const RAMPED_BLOCK_CLEARANCE_M: f64 = 0.004;
 /// Cap radius of an arm without a tool \[m\].
 const CAP_M: f64 = 0.02;
@@ -42,14 +42,14 @@ const TIMEOUT: Duration = Duration::from_secs(120);
 /// Speed at which a pushed tip hits a block \[m/s\].
 const PUSHED_M_PER_S: f64 = 0.25;
 
-/// Runs without an event, for comparison: one of each plant and task.
+/// Runs without an event for comparison, one for each plant and task.
 #[derive(Default)]
-pub struct Undisturbed {
+pub struct BaselineRuns {
     runs: Vec<((PlantKind, TestTask, bool), Vec<TraceRow>)>,
 }
 
-impl Undisturbed {
-    /// The trace of a task without an event, which is run if it has not been yet.
+impl BaselineRuns {
+    /// Returns the trace of a task without an event; runs the task on the first call.
     fn lines<const N: usize>(
         &mut self,
         spec: &Spec,
@@ -76,7 +76,7 @@ impl Undisturbed {
 pub fn perform<const N: usize>(
     spec: &Spec,
     arm: &TestArm,
-    undisturbed: &mut Undisturbed,
+    undisturbed: &mut BaselineRuns,
 ) -> Result<Row, Failure> {
     let run = Run::<N>::perform(spec, arm)?;
     let (config, script) = (&run.config, &run.script);
@@ -93,7 +93,7 @@ pub fn perform<const N: usize>(
         metrics.observable_at(at_ns, event_ns);
     }
     metrics.law_force_n = law_force_n(spec.task, config, &script.start_rad);
-    // An obstacle that stops the joint of a ramp looks like an encoder that sticks: the arm brakes and leans on it.
+    // An obstacle that stops the joint of a ramp cannot be distinguished from a stuck encoder: the arm brakes and leans on it.
     if spec.task == TestTask::Breakaway && metrics.braked_after_ms.is_some() {
         metrics.weight_n = Some(weight_n(config, &script.start_rad));
     }
@@ -134,7 +134,7 @@ impl<const N: usize> Run<N> {
         let domain = Domain::new(Some(&prefix)).map_err(Failure::system)?;
         let file = domain.folder().join(format!("{prefix}.csv"));
         let start_s = START_S[usize::from(spec.plant == PlantKind::Emu)];
-        let times = Times {
+        let times = EventTimes {
             event_s: start_s + script.event_cycle as f64 * config.period_s,
             back_s: match spec.event {
                 Event::Drives(DriveShutdown::EStop) => 0.0,
@@ -170,7 +170,7 @@ impl<const N: usize> Run<N> {
         run
     }
 
-    /// Time of a cycle of the script on the arm's clock \[ns\].
+    /// Returns the time of a cycle of the script on the arm's clock \[ns\].
     fn at(&self, cycles: u64) -> u64 {
         let cycle = (self.start_s / self.config.period_s).round() as u64 + cycles;
         let found = self.samples.iter().find(|sample| sample.cycle >= cycle);
@@ -186,7 +186,7 @@ impl<const N: usize> Run<N> {
         };
         match spec.event {
             Event::Injected {
-                when: When::FromTheStart,
+                when: FaultTime::FromTheStart,
                 ..
             } => first(|line| line.active),
             Event::Injected { .. } => first(|line| line.injections > 0),
@@ -196,15 +196,15 @@ impl<const N: usize> Run<N> {
     }
 }
 
-/// Times of a run \[s\].
-struct Times {
-    /// Of the event, from the start.
+/// Times of the events of a run \[s\].
+struct EventTimes {
+    /// Time of the event, from the start.
     event_s: f64,
-    /// From the event until drives are activated again.
+    /// Time from the event until the drives are activated again.
     back_s: f64,
 }
 
-impl Times {
+impl EventTimes {
     /// Arguments of the system of a test case.
     fn up(&self, spec: &Spec, arm: &TestArm, cap_m: f64, push_rad_per_s: f64) -> UpArgs {
         let at_rest = matches!(spec.task, TestTask::GravityHold | TestTask::Float);
@@ -232,9 +232,9 @@ impl Times {
     }
 }
 
-/// Faults to inject, with their times counted from active drives.
-fn injections(spec: &Spec, times: &Times, push: Option<f64>) -> Vec<Injection> {
-    let Times { event_s, back_s } = *times;
+/// Returns the faults to inject, with times relative to the activation of the drives.
+fn injections(spec: &Spec, times: &EventTimes, push: Option<f64>) -> Vec<Injection> {
+    let EventTimes { event_s, back_s } = *times;
     let active_s = match spec.plant {
         PlantKind::Emu => crate::up::GRAVITY_HOLD_S,
         _ => 0.0,
@@ -253,7 +253,7 @@ fn injections(spec: &Spec, times: &Times, push: Option<f64>) -> Vec<Injection> {
     match spec.event {
         Event::Injected {
             kind,
-            when: When::FromTheStart,
+            when: FaultTime::FromTheStart,
         } => vec![at_once(kind)],
         Event::Injected { kind, .. } => vec![at(kind)],
         Event::Activation(Activation::InFault) => vec![at(InjectionKind::EncoderOffset {
@@ -278,9 +278,9 @@ fn injections(spec: &Spec, times: &Times, push: Option<f64>) -> Vec<Injection> {
     }
 }
 
-/// Buttons that an operator presses on the pendant of an emulated arm.
-fn presses(spec: &Spec, times: &Times) -> Vec<String> {
-    let Times { event_s, back_s } = *times;
+/// Returns the buttons to press on the pendant of an emulated arm.
+fn presses(spec: &Spec, times: &EventTimes) -> Vec<String> {
+    let EventTimes { event_s, back_s } = *times;
     let at = |button: &str, after_s: f64| format!("{button}@held+{:.4}", event_s + after_s);
     match spec.event {
         Event::Drives(
@@ -288,7 +288,7 @@ fn presses(spec: &Spec, times: &Times) -> Vec<String> {
         ) => {
             vec![at("idle", 0.0), at("activate", back_s)]
         }
-        // The arm loses its positions with its power, and then asks for its home pose.
+        // The arm loses its position reference with its power, and then waits for the confirmation of its home pose.
         Event::Drives(DriveShutdown::EStop) => vec![
             at("e-stop", 0.0),
             at("release", RELEASE_S),
@@ -305,7 +305,7 @@ fn run<const N: usize>(
     script: &Script<N>,
     description: &Description,
     domain: &Domain,
-    times: &Times,
+    times: &EventTimes,
 ) -> Result<(Vec<ControllerSample>, Vec<String>), Failure> {
     let mut system = System::<N>::new(up, description, domain)?;
     let activate = spec.event != Event::Request(InvalidRequest::WhileIdle);
@@ -319,10 +319,10 @@ fn run<const N: usize>(
         if telemetry.is_none() {
             match system.clock_has_ended() {
                 Ok(true) => break,
-                // The arm's pose is not taken for its home pose again.
+                // The arm is not in its home pose: no confirmation is given.
                 Ok(false)
                     if spec.event == Event::Drives(DriveShutdown::EStop)
-                        && domain.home_files().question().is_some() =>
+                        && domain.home_files().requested_pose().is_some() =>
                 {
                     break;
                 }

@@ -1,8 +1,8 @@
 //! All test cases with their expected results. The expectations were written before the first run.
 
 use super::spec::{
-    Activation, DriveShutdown, Event, Expected, Hindrance, InvalidRequest, ProcessFailure, Spec,
-    TestTask, UP, When,
+    Activation, DriveShutdown, Event, Expected, FaultTime, InvalidRequest, ProcessFailure,
+    RequestObstruction, Spec, TestTask, UP,
 };
 use crate::cli::PlantKind;
 use crate::up::CONTROLLER;
@@ -19,10 +19,10 @@ const CONTROLLER_EXIT_MS: (f64, f64) = (0.0, 50.0);
 /// Limit from the event to rest or braking \[ms\]: the fault is detected within 100 ms of becoming observable; 500 ms
 /// later the tip is slow or the motors brake.
 const FAULT_AND_STOP_MS: f64 = 600.0;
-/// The same for faults that become observable only after some motion \[ms\].
+/// Limit for faults that become observable only after some motion \[ms\].
 const LATE_FAULT_AND_STOP_MS: f64 = 1100.0;
 
-/// Tasks in which faults of torques and of gravity are tried.
+/// Tasks in which faults of torques and of gravity are injected.
 const WITH_TORQUE: &[TestTask] = &[
     TestTask::GravityHold,
     TestTask::Move,
@@ -40,12 +40,12 @@ const CONTACT_FAULTS: &[&str] = &[
     "workspace",
     "joint_tracking_error",
 ];
-/// The same of the joint of a breakaway ramp.
+/// Valid faults when the joint of a breakaway ramp hits an obstacle.
 const RAMP_CONTACT_FAULTS: &[&str] = &extended::<6>(
     &extended::<5>(CONTACT_FAULTS, "encoder_stuck"),
     "encoder_unmoved",
 );
-/// The same in the pose mode.
+/// Valid faults when the arm hits an obstacle in the pose mode.
 const POSE_CONTACT_FAULTS: &[&str] = &[
     "joint_collision",
     "tip_collision",
@@ -95,7 +95,7 @@ pub const WRONG_DIRECTION_FAULTS: &[&str] = &[
     "rotation_error",
     "singular",
 ];
-/// The same for angles that come late: until the delay has built up, they do not change; then they make the loop unstable.
+/// Valid faults for delayed angles: they stay constant until the delay has built up, then they make the loop unstable.
 const LATE_ENCODER_FAULTS: &[&str] = &extended::<15>(
     &extended::<14>(
         &extended::<13>(WRONG_DIRECTION_FAULTS, "encoder_stuck"),
@@ -103,7 +103,7 @@ const LATE_ENCODER_FAULTS: &[&str] = &extended::<15>(
     ),
     "oscillation",
 );
-/// Valid faults for torques that come so late that the loop is unstable.
+/// Valid faults for torques that are delayed so much that the loop is unstable.
 const LATE_TORQUE_FAULTS: &[&str] = &["oscillation", "joint_speed", "joint_collision"];
 /// Valid faults for lost, jumping or non-finite joint angles.
 pub const ENCODER_LOSS_FAULTS: &[&str] = &[
@@ -122,11 +122,11 @@ const UNMODELLED_LOAD_FAULTS: &[&str] = &[
     "tip_collision",
 ];
 
-/// The same during tracking, where the tracking error may trip first.
+/// Valid faults for an unmodelled load during tracking, where the tracking error may trip first.
 const UNMODELLED_LOAD_TRACKING_FAULTS: &[&str] =
     &extended::<5>(UNMODELLED_LOAD_FAULTS, "tracking_error");
 
-/// A list of `N` names: those of another list, and one more.
+/// Returns a list of `N` names: the names of another list, and one more.
 const fn extended<const N: usize>(names: &[&'static str], more: &'static str) -> [&'static str; N] {
     assert!(names.len() + 1 == N);
     let mut all = [more; N];
@@ -155,7 +155,7 @@ const ALL_TASKS: [TestTask; 7] = [
     TestTask::JointImpedance,
 ];
 
-/// Cases of processes that fail: of the tasks that `supple up` begins with.
+/// Returns the test cases of process failures, for the tasks with which `supple up` begins.
 fn wall_clock_cases(plant: PlantKind) -> Vec<Spec> {
     let brakes = |(from, to)| Expected::Brakes(from, to);
     let mut processes = match plant {
@@ -190,12 +190,12 @@ fn wall_clock_cases(plant: PlantKind) -> Vec<Spec> {
                 let expected = match (*name, loss) {
                     // `supple up` only supervises; stopping it does not affect the arm.
                     (UP, ProcessFailure::Stop) => Expected::KeepsRunning,
-                    // The arm is gone, with its motors.
+                    // The emulated arm has ended, with its motors.
                     (
                         "supple-emu" | "supple-sim",
                         ProcessFailure::Terminate | ProcessFailure::Interrupt,
                     ) => *expected,
-                    // Who is asked to end sets the drives to idle first.
+                    // A controller that receives SIGTERM sets the drives to idle before it ends.
                     (_, ProcessFailure::Terminate | ProcessFailure::Interrupt) => {
                         brakes(CONTROLLER_EXIT_MS)
                     }
@@ -206,11 +206,14 @@ fn wall_clock_cases(plant: PlantKind) -> Vec<Spec> {
         }
     }
     for task in ALL_TASKS.into_iter().chain([TestTask::TrackPose]) {
-        let waiting = Event::Hindered(Hindrance::RequestsWait);
+        let waiting = Event::Hindered(RequestObstruction::RequestsWait);
         cases.push(row(task, waiting, Expected::IdleAccepted));
     }
     for task in [TestTask::GravityHold, TestTask::Move, TestTask::Track] {
-        for full in [Hindrance::LogDiskFull, Hindrance::StandardErrorFull] {
+        for full in [
+            RequestObstruction::LogDiskFull,
+            RequestObstruction::StandardErrorFull,
+        ] {
             cases.push(row(task, Event::Hindered(full), Expected::IdleAccepted));
         }
     }
@@ -236,11 +239,11 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     };
     let injected = |kind| Event::Injected {
         kind,
-        when: When::InTheTask(0),
+        when: FaultTime::InTheTask(0),
     };
     let from_the_start = |kind| Event::Injected {
         kind,
-        when: When::FromTheStart,
+        when: FaultTime::FromTheStart,
     };
     let (stops, runs_or_faults) = (Expected::FaultAndRest, Expected::KeepsRunningOrFault);
     let one = Some(1);
@@ -290,7 +293,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         runs_or_faults(RAMP_CONTACT_FAULTS),
         LATE_FAULT_AND_STOP_MS,
     );
-    // A contact flings the light joints of the wrist.
+    // A contact accelerates the light joints of the wrist strongly.
     add(
         &[TrackPose],
         Event::Obstacle,
@@ -305,10 +308,10 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     );
 
     // Encoders.
-    // Joint 3 has a motor, and so an encoder, of its own.
+    // Joint 3 has its own motor and therefore its own encoder.
     let stuck = injected(Kind::EncoderStuck { joint: Some(3) });
     let all_stuck = injected(Kind::EncoderStuck { joint: None });
-    // A stuck encoder is not observable while the arm is stationary, or moves this joint by less than the check resolves.
+    // A stuck encoder is not observable while this joint is stationary, or moves by less than the resolution of the check.
     add(
         &[GravityHold, Float, Breakaway, Excite],
         stuck,
@@ -346,7 +349,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         stops(STUCK_ENCODER_FAULTS),
         LATE_FAULT_AND_STOP_MS,
     );
-    // The encoders of many arms are on their motors: one that sticks shows two wrong angles if its motor drives two joints.
+    // Many arms have their encoders on the motors: a stuck encoder causes two wrong angles if its motor moves two joints.
     let motor_stuck = injected(Kind::MotorEncoderStuck { motor: 1 });
     add(
         &[GravityHold, Float, Breakaway],
@@ -360,12 +363,12 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         stops(STUCK_ENCODER_FAULTS),
         LATE_FAULT_AND_STOP_MS,
     );
-    // Slow, fast and near a reversal: a stiff law drives what it does not see.
+    // Slow, fast and near a reversal: a stiff law accelerates a joint whose motion the encoder does not show.
     for motor in [0, 1, 2, 3] {
         for after_ms in [-600, 300, 700, 1700] {
             let stuck = Event::Injected {
                 kind: Kind::MotorEncoderStuck { motor },
-                when: When::InTheTask(after_ms),
+                when: FaultTime::InTheTask(after_ms),
             };
             add(
                 &[TrackStiff],
@@ -408,7 +411,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         stops(WRONG_DIRECTION_FAULTS),
         LATE_FAULT_AND_STOP_MS,
     );
-    // The move to the start pose shows it.
+    // The move to the start pose makes the fault observable.
     add(
         &[GravityHold],
         from_the_start(Kind::EncoderSign { joint: one }),
@@ -481,11 +484,11 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         stops(WRONG_DIRECTION_FAULTS),
         FAULT_AND_STOP_MS,
     );
-    // Slow and fast, upwards and downwards: what the torque drives differs.
+    // Slow and fast, upwards and downwards: the effect of the torque differs.
     for after_ms in [-600, -300, 300, 600, 1200] {
         let reversed = Event::Injected {
             kind: Kind::TorqueSign { joint: 1 },
-            when: When::InTheTask(after_ms),
+            when: FaultTime::InTheTask(after_ms),
         };
         add(
             &[Track],
@@ -552,8 +555,8 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         FAULT_AND_STOP_MS,
     );
 
-    // Float yields to a load as to a hand; its speed limits end the fall. Compliant joints sag by what their stiffness
-    // gives, as under any force: no test case.
+    // Float yields to a load as to a hand; its speed limits end the fall. Compliant joints yield according to their stiffness,
+    // as to any force: there is no test case for them.
     add(
         &[Float],
         injected(payload),
@@ -592,7 +595,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
         FAULT_AND_STOP_MS,
     );
     if plant == PlantKind::Emu {
-        // Without power the motor pucks lose their positions, so the drives cannot be re-enabled automatically.
+        // Without power, the motor pucks lose their position reference, so the drives cannot be re-enabled automatically.
         let activated = Event::Activation(Activation::InFault);
         add(
             &[GravityHold, Move, Track, Float, JointImpedance, Breakaway],
@@ -637,7 +640,7 @@ fn virtual_time_cases(plant: PlantKind) -> Vec<Spec> {
     cases
 }
 
-/// Drives that are lost, and the faults of motors and model, again with the effects of a real arm.
+/// Returns the cases of lost drives, motor faults and model faults again, with the effects of a real arm.
 fn realistic_cases(cases: &[Spec]) -> Vec<Spec> {
     let of_drives = |spec: &&Spec| {
         matches!(

@@ -8,8 +8,8 @@ use supple_ipc::message::{Drives, MAX_DOF, Telemetry};
 
 /// Time after a fault from which the tip must be slow \[ns\].
 const STOPPED_NS: u64 = 500_000_000;
-/// Time after a fault from which the kinetic energy may not exceed that at the fault, and time before an event in which the
-/// energy of the undisturbed motion is measured \[ns\].
+/// Time after a fault from which the kinetic energy may not exceed the energy at the fault. Also the time before an event in
+/// which the energy of the undisturbed motion is measured \[ns\].
 const ENERGY_CHECK_NS: u64 = 200_000_000;
 /// Time within which braking motors have their effect \[ns\].
 const BRAKING_NS: u64 = 10_000_000;
@@ -60,13 +60,13 @@ impl ControllerSample {
 pub struct RowMetrics {
     /// Name of the first fault after the event.
     pub fault: Option<&'static str>,
-    /// A fault that latched before the event; the test case is then invalid.
+    /// Name of a fault that latched before the event; the test case is then invalid.
     pub fault_before: Option<&'static str>,
-    /// Time from the event to that fault \[ms\].
+    /// Time from the event to the first fault after it \[ms\].
     pub fault_after_ms: Option<f64>,
     /// Time from an injection until it can be observed \[ms\], see [`super::observable`].
     pub observable_after_ms: Option<f64>,
-    /// Time from then to the fault, zero if the fault came first \[ms\].
+    /// Time from when the injection is observable to the fault; zero if the fault is earlier \[ms\].
     pub detected_after_ms: Option<f64>,
     /// Time from the event until the motors brake \[ms\].
     pub braked_after_ms: Option<f64>,
@@ -76,9 +76,9 @@ pub struct RowMetrics {
     pub energy_before_j: f64,
     /// Kinetic energy at the fault, or when braking began \[J\].
     pub energy_at_fault_j: Option<f64>,
-    /// Maximum kinetic energy from that time until 10 ms after braking began \[J\], and the time from the one to the other \[ms\].
+    /// Maximum kinetic energy from the fault until 10 ms after braking began \[J\], and the duration of this interval \[ms\].
     pub energy_peak: Option<(f64, f64)>,
-    /// Maximum kinetic energy from 0.2 s after that time \[J\].
+    /// Maximum kinetic energy from 0.2 s after the fault \[J\].
     pub energy_later_j: Option<f64>,
     /// Maximum tip speed from the start of the task to the event \[m/s\].
     pub tip_before_m_per_s: f64,
@@ -90,7 +90,8 @@ pub struct RowMetrics {
     pub tip_later_m_per_s: Option<f64>,
     /// Maximum distance of the tip from its position at the event \[m\].
     pub tip_moved_m: f64,
-    /// The same until 0.2 s after the fault, or after braking began; none without either \[m\].
+    /// Maximum distance of the tip from its position at the event, until 0.2 s after the fault or after braking began; none without
+    /// either \[m\].
     pub stopped_in_m: Option<f64>,
     /// Maximum force in the first 20 ms of the first contact \[N\].
     pub impact_n: f64,
@@ -104,7 +105,7 @@ pub struct RowMetrics {
     pub law_force_n: Option<f64>,
     /// Force with which the weight of the arm may rest on the block \[N\]; none if it does not brake.
     pub weight_n: Option<f64>,
-    /// Maximum rise of the mechanical energy, kinetic and potential, after the fault \[J\]; where the encoders are right.
+    /// Maximum rise of the mechanical energy, kinetic and potential, after the fault \[J\]; only if the encoders are correct.
     pub energy_gained_j: Option<f64>,
     /// Maximum descent of the tip after the fault \[m\].
     pub descent_m: f64,
@@ -241,7 +242,7 @@ impl RowMetrics {
         metrics
     }
 
-    /// Adds when the fault could be observed: `at_ns` on the arm's clock, with the event at `event_ns`.
+    /// Adds the time at which the fault was observable: `at_ns` on the arm's clock, with the event at `event_ns`.
     pub fn observable_at(&mut self, at_ns: Option<u64>, event_ns: u64) {
         self.observable_after_ms = at_ns.map(|at_ns| at_ns.saturating_sub(event_ns) as f64 * 1e-6);
         if let (Some(from_ms), Some(fault_ms)) = (self.observable_after_ms, self.fault_after_ms) {

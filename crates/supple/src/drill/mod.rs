@@ -1,5 +1,5 @@
 //! `supple drill`: injects process failures, faults, collisions and invalid requests into complete systems with
-//! simulated arms, and compares what the arm did with the expected results in [`matrix`].
+//! simulated arms, and compares the motion of the arm with the expected results in [`matrix`].
 //!
 //! | event | test method |
 //! |---|---|
@@ -15,7 +15,6 @@
 //! (`supple-plant/tests/plant/braking.rs`).
 
 mod evaluation;
-mod hindrance;
 mod lockstep;
 mod matrix;
 mod metrics;
@@ -23,6 +22,7 @@ mod motors;
 mod observable;
 mod perform;
 mod random;
+mod request_obstruction;
 mod row;
 mod spec;
 mod task;
@@ -30,7 +30,7 @@ mod test_arms;
 mod trace;
 mod up_process;
 
-use lockstep::Undisturbed;
+use lockstep::BaselineRuns;
 use test_arms::{TestArm, TestArms};
 
 use crate::cli::{DrillArgs, PlantKind};
@@ -42,7 +42,7 @@ use supple_cli::exit::Failure;
 use supple_cli::interrupt;
 use supple_model::with_dof;
 
-/// Arm of the command line, unless another one is named.
+/// Default arm of the command line.
 const DEFAULT_ARM: &str = "wam4";
 
 /// Runs `supple drill`.
@@ -75,7 +75,7 @@ pub fn run(args: &DrillArgs) -> Result<(), Failure> {
         return print_line(&lines.join("\n"));
     }
     let stop = interrupt::shutdown_on_interrupt();
-    let (mut rows, mut undisturbed): (Vec<Row>, _) = (Vec::new(), Undisturbed::default());
+    let (mut rows, mut undisturbed): (Vec<Row>, _) = (Vec::new(), BaselineRuns::default());
     for (index, spec) in specs.iter().enumerate() {
         if stop.shutdown_requested() {
             break;
@@ -102,7 +102,7 @@ pub fn run(args: &DrillArgs) -> Result<(), Failure> {
 }
 
 impl DrillArgs {
-    /// The command line that selects these test cases.
+    /// Returns the command line that selects these test cases.
     fn command_line(&self) -> String {
         let mut parts = vec!["supple drill".to_owned()];
         if self.arm != DEFAULT_ARM {
@@ -122,7 +122,7 @@ impl DrillArgs {
         parts.extend(self.only.iter().map(|part| format!("--only {part}")));
         parts.extend(self.virtual_time.then(|| "--virtual-time".to_owned()));
         if let Some(file) = &self.markdown {
-            // The page states how to write it, wherever it was written.
+            // The page contains the command that creates it at the default path.
             let name = file.file_name().unwrap_or_default().to_string_lossy();
             parts.push(format!("--markdown docs/{name}"));
         }
@@ -156,7 +156,7 @@ fn perform(
     spec: &Spec,
     args: &DrillArgs,
     arm: &TestArm,
-    undisturbed: &mut Undisturbed,
+    undisturbed: &mut BaselineRuns,
 ) -> Result<Row, Failure> {
     let result = with_dof!(arm.description.dof(), N => match spec.runs_in_wall_clock_time() {
         true => perform::perform::<N>(spec, args, arm),

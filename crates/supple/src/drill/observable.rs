@@ -1,10 +1,10 @@
-//! When a fault could be observed: an angle is wrong, or the arm has left the path that it takes without the fault.
+//! Time from which a fault is observable: an angle is wrong, or the arm has left the path that it takes without the fault.
 
 use super::trace::TraceRow;
 use supple_core::{Config, Vector};
 use supple_plant::InjectionKind;
 
-/// Whether the fault is one of the sensors: what they report is wrong from then on.
+/// Whether the fault is a sensor fault, which makes the reported values wrong.
 pub fn is_of_sensors(kind: InjectionKind) -> bool {
     matches!(
         kind,
@@ -18,9 +18,9 @@ pub fn is_of_sensors(kind: InjectionKind) -> bool {
     )
 }
 
-/// First time from the injection at `event_ns` on at which the fault could be observed \[ns\]: at once, if a reply is missing
-/// or an angle jumps; else as soon as an angle is wrong, or a joint has left its path in the run without the fault, by more
-/// than the checks resolve (`stuck_rad`).
+/// Returns the first time from the injection at `event_ns` on at which the fault is observable \[ns\]. If a reply is missing or
+/// an angle jumps, this is at once; otherwise as soon as an angle is wrong, or a joint has left its path in the run without the
+/// fault, by more than the resolution of the checks (`stuck_rad`).
 pub fn observable_ns<const N: usize>(
     kind: InjectionKind,
     config: &Config<N>,
@@ -33,7 +33,7 @@ pub fn observable_ns<const N: usize>(
         InjectionKind::EncoderOffset { .. }
         | InjectionKind::EncoderNan { .. }
         | InjectionKind::ReplyLost { .. } => return Some(event_ns),
-        // Not a fault, but what somebody does to the arm.
+        // This is not a fault but an external action on the arm.
         InjectionKind::Bump { .. } | InjectionKind::DrivesIdle { .. } => return None,
         InjectionKind::EncoderStuck { joint } => {
             first_ns(lines, event_ns, resolution_rad, |turned_rad| {
@@ -59,22 +59,23 @@ pub fn observable_ns<const N: usize>(
     [wrong_ns, left_ns].into_iter().flatten().min()
 }
 
-/// Largest angle by which `joint`, or any joint, has turned.
+/// Returns the largest rotation of `joint`, or of any joint.
 fn largest(turned_rad: &[f64], joint: Option<usize>) -> f64 {
     let counts = |(index, _): &(usize, &f64)| joint.is_none_or(|joint| joint == *index);
     let turned_rad = turned_rad.iter().enumerate().filter(counts);
     turned_rad.fold(0.0, |largest, (_, angle)| largest.max(angle.abs()))
 }
 
-/// First time at which a joint has turned otherwise since `event_ns` than in the run without the fault, by more than
-/// `resolution_rad`; until the plant of that run ends.
+/// Returns the first time at which the rotation of a joint since `event_ns` differs from the run without the fault by more than
+/// `resolution_rad`. The comparison ends with the run without the fault.
 fn left_path_ns(
     lines: &[TraceRow],
     undisturbed: &[TraceRow],
     event_ns: u64,
     resolution_rad: f64,
 ) -> Option<u64> {
-    let mut both = Turned::new(lines, event_ns).zip(Turned::new(undisturbed, event_ns));
+    let mut both =
+        JointRotations::new(lines, event_ns).zip(JointRotations::new(undisturbed, event_ns));
     both.find_map(|((time_ns, turned_rad), (_, undisturbed_rad))| {
         let away_rad = turned_rad.iter().zip(&undisturbed_rad).map(|(a, b)| a - b);
         let away_rad = away_rad.fold(0.0_f64, |largest, away| largest.max(away.abs()));
@@ -82,35 +83,35 @@ fn left_path_ns(
     })
 }
 
-/// First time from `event_ns` on at which `error_rad` of the angles turned since then exceeds `resolution_rad`.
+/// Returns the first time from `event_ns` on at which `error_rad` of the rotations since then exceeds `resolution_rad`.
 fn first_ns(
     lines: &[TraceRow],
     event_ns: u64,
     resolution_rad: f64,
     error_rad: impl Fn(&[f64]) -> f64,
 ) -> Option<u64> {
-    Turned::new(lines, event_ns).find_map(|(time_ns, turned_rad)| {
+    JointRotations::new(lines, event_ns).find_map(|(time_ns, turned_rad)| {
         (error_rad(&turned_rad) > resolution_rad).then_some(time_ns)
     })
 }
 
-/// Angles by which the joints have turned since a time, one row after the other, with the time of the row \[ns\].
-struct Turned<'a> {
+/// Iterator over the rows of a trace: time of the row \[ns\], and rotation of each joint since a given time.
+struct JointRotations<'a> {
     lines: &'a [TraceRow],
     turned_rad: Vec<f64>,
 }
 
-impl<'a> Turned<'a> {
-    fn new(lines: &'a [TraceRow], from_ns: u64) -> Turned<'a> {
+impl<'a> JointRotations<'a> {
+    fn new(lines: &'a [TraceRow], from_ns: u64) -> JointRotations<'a> {
         let before = lines.partition_point(|line| line.time_ns < from_ns);
-        Turned {
+        JointRotations {
             lines: &lines[before..],
             turned_rad: Vec::new(),
         }
     }
 }
 
-impl Iterator for Turned<'_> {
+impl Iterator for JointRotations<'_> {
     type Item = (u64, Vec<f64>);
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -135,7 +136,7 @@ mod tests {
     const MS: u64 = 1_000_000;
     const EVENT_NS: u64 = 1000 * MS;
 
-    /// Four seconds in which two joints, of four, turn at these speeds from the event on.
+    /// Returns a trace of four seconds in which two of four joints turn at these speeds from the event on.
     fn turning(first_rad_per_s: f64, second_rad_per_s: f64) -> Vec<TraceRow> {
         let line = |ms: u64| TraceRow {
             time_ns: ms * MS,
@@ -168,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn an_encoder_that_sticks_or_counts_backwards_is_observable_when_its_angle_is_wrong() {
+    fn a_stuck_or_reversed_encoder_is_observable_when_its_angle_is_wrong() {
         let lines = turning(0.5, 0.05);
         let stuck = |joint| InjectionKind::EncoderStuck { joint };
         let after = |kind| observable_ms(kind, &lines, &lines);
@@ -189,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reply_that_is_missing_is_observable_at_once() {
+    fn a_missing_reply_is_observable_at_once() {
         let lost = InjectionKind::ReplyLost {
             joint: Some(1),
             every: 2,

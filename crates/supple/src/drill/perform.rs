@@ -1,8 +1,8 @@
 //! Runs a test case in wall-clock time, from normal operation through the failure to recovery.
 
-use super::hindrance::{FullOutput, idle_after, idle_past_a_full_queue};
+use super::request_obstruction::{FullOutput, idle_after, idle_past_a_full_queue};
 use super::row::{ProcessTestResult, Row};
-use super::spec::{Event, Hindrance, ProcessFailure, Spec, TestTask, UP};
+use super::spec::{Event, ProcessFailure, RequestObstruction, Spec, TestTask, UP};
 use super::task;
 use super::test_arms::TestArm;
 use super::trace::TraceAfterLoss;
@@ -31,13 +31,13 @@ const OBSERVED: [Duration; 2] = [Duration::from_secs(2), Duration::from_millis(1
 const TIMEOUT: Duration = Duration::from_secs(20);
 /// Number of start attempts before the test case is given up.
 const ATTEMPTS: u32 = 3;
-/// Time limit for controller and drives to reach idle; a braked arm descends meanwhile.
+/// Timeout for controller and drives to reach idle; a braked arm descends during this time.
 const REST_TIMEOUT: Duration = Duration::from_millis(200);
 /// Cap radius of an arm without a tool \[m\].
 const CAP_M: f64 = 0.02;
 /// Time of the move to the start of an excitation \[s\].
 const MOVE_TO_START_S: f64 = 1.0;
-/// The same to the start of the pose task, which is farther away \[s\].
+/// Time of the move to the start of the pose task, which is farther away \[s\].
 const MOVE_TO_POSE_S: f64 = 4.0;
 
 /// Runs a test case in wall-clock time.
@@ -76,9 +76,9 @@ pub fn perform<const N: usize>(
     };
     let lose = || match spec.event {
         Event::Process { name: UP, .. } => lose_up_process::<N>(spec, &up, description, &domain),
-        Event::Hindered(full @ (Hindrance::LogDiskFull | Hindrance::StandardErrorFull)) => {
-            hinder_up::<N>(spec, full, &up, description, &domain)
-        }
+        Event::Hindered(
+            full @ (RequestObstruction::LogDiskFull | RequestObstruction::StandardErrorFull),
+        ) => obstruct_up::<N>(spec, full, &up, description, &domain),
         _ => lose_process::<N>(spec, &up, description, &domain),
     };
     let mut lost = lose();
@@ -187,7 +187,7 @@ fn lose_process<const N: usize>(
     let mut idle_after_ms = None;
     match spec.event {
         Event::Process { name, loss } => system.signal(name, signal(loss))?,
-        Event::Hindered(Hindrance::RequestsWait) => {
+        Event::Hindered(RequestObstruction::RequestsWait) => {
             idle_after_ms = Some(idle_past_a_full_queue::<N>(domain, || {
                 system.poll_telemetry()
             })?);
@@ -255,8 +255,8 @@ fn poll_until(
     Ok(None)
 }
 
-/// Does what an operator does after a process restart: clears the pendant's faults, resets the controller, waits in
-/// idle and restarts the task.
+/// Performs the actions of an operator after a process restart: clears the pendant's faults, resets the controller, waits
+/// in idle and restarts the task.
 fn recover_after_restart<const N: usize>(
     system: &mut System<'_, N>,
     plant: PlantKind,
@@ -294,7 +294,7 @@ fn recover_after_restart<const N: usize>(
 fn comes_to_rest<const N: usize>(system: &mut System<'_, N>) -> Result<bool, Failure> {
     for request in [Request::Reset, Request::Idle] {
         match system.send_request(&request) {
-            // Nothing to reset, or the controller is not running yet.
+            // There is no fault to reset, or the controller is not running yet.
             Ok(()) | Err(Failure::Refused { .. }) => {}
             Err(Failure::NotRunning { .. }) => return Ok(false),
             Err(failure) => return Err(failure),
@@ -372,10 +372,10 @@ fn next_telemetry(reader: &mut TelemetryReader) -> Result<Option<Telemetry>, Fai
         .map_err(Failure::system)
 }
 
-/// Starts `supple up` whose output of this kind becomes full, and asks for idle.
-fn hinder_up<const N: usize>(
+/// Starts `supple up`, makes its output of this kind full, and requests idle.
+fn obstruct_up<const N: usize>(
     spec: &Spec,
-    full: Hindrance,
+    full: RequestObstruction,
     up: &UpArgs,
     description: &Description,
     domain: &Domain,
@@ -387,7 +387,7 @@ fn hinder_up<const N: usize>(
     output.fill(&running)?;
     let begin_ns = monotonic_ns();
     let mut idle_after_ms = idle_after::<N>(domain)?;
-    // The system goes on: its telemetry has the idle mode.
+    // The system keeps running: its telemetry shows the idle mode.
     let idle = poll_until(
         || next_telemetry(&mut reader),
         OBSERVED[1],

@@ -10,7 +10,7 @@ use std::fmt::Write;
 /// Maximum rise of a motor torque after the commands stop \[N m\]: the fallback torque is gravity compensation, which
 /// may exceed the last command.
 const MAX_TORQUE_RISE_NM: f64 = 1.0;
-/// The same in a downward motion along joint references, whose last command is below the weight.
+/// Maximum rise of a motor torque in a downward motion along joint references, whose last torque is below the weight.
 const MAX_DESCENT_TORQUE_RISE_NM: f64 = 10.0;
 
 /// Result of a test case.
@@ -93,7 +93,7 @@ impl Row {
         }
     }
 
-    /// Result of a test case in virtual time.
+    /// Creates the result of a test case in virtual time.
     pub fn lockstep(
         spec: &Spec,
         metrics: RowMetrics,
@@ -106,13 +106,13 @@ impl Row {
         }
     }
 
-    /// Result of a test case that could not be run.
+    /// Creates the result of a test case that could not be run.
     pub fn failed(spec: &Spec, message: &str) -> Row {
         let deviations = vec![format!("could not be run: {message}")];
         Row::new(spec, "-".to_owned(), deviations)
     }
 
-    /// Result of a test case in wall-clock time.
+    /// Creates the result of a test case in wall-clock time.
     pub fn wall_clock(spec: &Spec, after: &TraceAfterLoss, result: &ProcessTestResult) -> Row {
         const IDLE_RESPONSE_MS: f64 = 20.0;
         let braked_after_ms = after.braked_after_ms();
@@ -267,7 +267,7 @@ or emulated (`emu`) arm that performs a task, and one event. The expected result
   arm brakes, and its weight may rest on the block.
 ";
 
-/// Formats the results as a Markdown page that states its command line.
+/// Formats the results as a Markdown page that contains its command line.
 pub fn page(rows: &[Row], command: &str) -> String {
     let passed = rows.iter().filter(|row| row.as_expected).count();
     let introduction = PAGE.replace("{command}", command);

@@ -27,7 +27,7 @@ pub enum TestTask {
     JointImpedance,
     /// A torque ramp on the shoulder that has not moved it yet, with the other joints held.
     Breakaway,
-    /// The same downward path of the tip while it turns, with the 7-joint WAM and every joint active.
+    /// The downward path of the tip while it rotates, with the 7-joint WAM and every joint active.
     TrackPose,
 }
 
@@ -35,44 +35,44 @@ pub enum TestTask {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ProcessFailure {
-    /// By `kill -9`.
+    /// The process is killed by `kill -9`.
     Kill,
-    /// By SIGSTOP; SIGCONT follows.
+    /// The process is stopped by SIGSTOP; SIGCONT follows.
     Stop,
-    /// By SIGTERM, which asks for an orderly end.
+    /// The process receives SIGTERM, which requests an orderly end.
     Terminate,
-    /// By SIGINT, as from a terminal that sends it to one process alone.
+    /// The process alone receives SIGINT, as from a terminal.
     Interrupt,
 }
 
-/// When a fault is injected.
+/// Time at which a fault is injected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum When {
+pub enum FaultTime {
     /// Before the first cycle.
     FromTheStart,
-    /// At the usual time of the task, near its highest speed, or this much later or earlier \[ms\].
+    /// At the usual time of the task, near its highest speed, shifted by this time \[ms\].
     InTheTask(i16),
 }
 
-/// How the drives are disabled.
+/// Way in which the drives are disabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DriveShutdown {
-    /// To idle.
+    /// The drives are set to idle.
     Idle,
-    /// To idle, after the operator has requested gains of 1000 N/m.
+    /// The drives are set to idle after the operator has requested gains of 1000 N/m.
     IdleWhenStiff,
-    /// By the emergency stop.
+    /// The emergency stop is pressed.
     EStop,
-    /// To idle, in the home pose, until the arm has sunk onto its stops.
+    /// The drives are set to idle in the home pose, until the arm has sunk onto its stops.
     IdleAtHome,
 }
 
-/// When an operator presses the pendant's activate button although the controller is not in gravity hold.
+/// Situation in which an operator activates the drives although the controller is not in gravity hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Activation {
     /// A fault has set the drives to idle.
     InFault,
-    /// The drives are active, and the arm works.
+    /// The drives are active, and the arm performs its task.
     InWork,
 }
 
@@ -81,20 +81,20 @@ pub enum Activation {
 pub enum InvalidRequest {
     /// The sinusoid at 1000 times its speed.
     TooFast,
-    /// Damping above the bound that the delay of the drives sets.
+    /// Damping above the bound that follows from the delay of the drives.
     TooStiff,
     /// A move while the drives are idle.
     WhileIdle,
 }
 
-/// What must not keep an operator from being heard.
+/// Condition in which a request of an operator must still arrive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Hindrance {
+pub enum RequestObstruction {
     /// Sixteen requests fill the queue.
     RequestsWait,
     /// The disk of the log is full.
     LogDiskFull,
-    /// Nobody reads standard error, and it is full.
+    /// Standard error is full and is not read.
     StandardErrorFull,
 }
 
@@ -113,20 +113,20 @@ pub enum Event {
         /// How the process fails.
         loss: ProcessFailure,
     },
-    /// Idle is requested in spite of a hindrance; in wall-clock time.
-    Hindered(Hindrance),
+    /// Idle is requested under such a condition; in wall-clock time.
+    Hindered(RequestObstruction),
     /// A fault in the arm.
     Injected {
         /// The injected fault.
         kind: InjectionKind,
         /// When it begins.
-        when: When,
+        when: FaultTime,
     },
-    /// A block of wood is in the way.
+    /// A block of wood blocks the path.
     Obstacle,
     /// The drives are disabled, and activated again later.
     Drives(DriveShutdown),
-    /// Somebody activates the drives where that must not have an effect.
+    /// An operator activates the drives in a situation in which this must have no effect.
     Activation(Activation),
     /// An operator sends an invalid request.
     Request(InvalidRequest),
@@ -137,13 +137,13 @@ pub enum Event {
 pub enum Expected {
     /// The system keeps running: no fault, drives active.
     KeepsRunning,
-    /// One of these faults occurs, and then the arm rests or brakes.
+    /// One of these faults occurs, and then the arm stands still or brakes.
     FaultAndRest(&'static [&'static str]),
     /// Either the system keeps running or one of these faults occurs; in both cases the arm does not accelerate.
     KeepsRunningOrFault(&'static [&'static str]),
     /// The motors keep the last or the fallback torque, and brake between these two times \[ms\].
     Brakes(f64, f64),
-    /// The plant process is gone: the controller latches a fault.
+    /// The plant process has ended: the controller latches a fault.
     ControllerFault,
     /// The request is refused with a reason, and the arm does not move.
     Refused,
@@ -151,7 +151,8 @@ pub enum Expected {
     ReturnsToGravityHold,
     /// Idle is accepted within 20 ms.
     IdleAccepted,
-    /// One of these faults occurs; the drives that are activated in it are idle again at once, and the arm does not jump.
+    /// One of these faults occurs; if the drives are activated in the fault, they become idle again at once, and the arm does not
+    /// jump.
     StaysIdle(&'static [&'static str]),
 }
 
@@ -168,7 +169,7 @@ pub struct Spec {
     pub expected: Expected,
     /// Time limit from the event to rest or braking \[ms\].
     pub within_ms: f64,
-    /// Whether the simulated arm has the effects of a real one.
+    /// Whether the simulated arm has the effects of a real arm.
     pub realistic: bool,
 }
 
@@ -224,9 +225,9 @@ impl fmt::Display for Event {
                 write!(f, "{how}-{name}")
             }
             Event::Hindered(hindrance) => f.write_str(match hindrance {
-                Hindrance::RequestsWait => "sixteen-requests-wait",
-                Hindrance::LogDiskFull => "log-disk-full",
-                Hindrance::StandardErrorFull => "standard-error-full",
+                RequestObstruction::RequestsWait => "sixteen-requests-wait",
+                RequestObstruction::LogDiskFull => "log-disk-full",
+                RequestObstruction::StandardErrorFull => "standard-error-full",
             }),
             Event::Injected { kind, when } => {
                 let injection = supple_plant::Injection {
@@ -234,9 +235,9 @@ impl fmt::Display for Event {
                     trigger: supple_plant::Trigger::AtStart,
                 };
                 match when {
-                    When::FromTheStart => write!(f, "{injection}-from-the-start"),
-                    When::InTheTask(0) => write!(f, "{injection}"),
-                    When::InTheTask(after_ms) => write!(f, "{injection}{after_ms:+}-ms"),
+                    FaultTime::FromTheStart => write!(f, "{injection}-from-the-start"),
+                    FaultTime::InTheTask(0) => write!(f, "{injection}"),
+                    FaultTime::InTheTask(after_ms) => write!(f, "{injection}{after_ms:+}-ms"),
                 }
             }
             Event::Obstacle => f.write_str("block-in-the-way"),

@@ -1,7 +1,7 @@
 //! Requests that move the arm to its start pose and start the task. Cycles are counted from the first one in which the
 //! controller accepts requests.
 
-use super::spec::{DriveShutdown, Event, InvalidRequest, Spec, TestTask, When};
+use super::spec::{DriveShutdown, Event, FaultTime, InvalidRequest, Spec, TestTask};
 use crate::cli::UpTrajectory;
 use crate::operate::{Approach, trajectory_for};
 use supple_cli::exit::Failure;
@@ -17,19 +17,18 @@ use supple_model::Description;
 /// Distance and duration of the downward move: minimum jerk, peak speed 0.25 m/s.
 const DESCENT_M: f64 = 0.2;
 const DESCENT_S: f64 = 1.5;
-/// Duration of the same motion in joint impedance mode, where the joints lag behind the reference and catch up: peak
-/// speed 0.19 m/s.
+/// Duration of the downward move in joint impedance mode, in which the joints lag behind the reference: peak speed 0.19 m/s.
 const COMPLIANT_DESCENT_S: f64 = 2.0;
-/// Duration of the same motion at the tip stiffness of the law, while the tip turns: peak speed 0.15 m/s.
+/// Duration of the downward move at the tip stiffness of the law, while the tip rotates: peak speed 0.15 m/s.
 const POSE_DESCENT_S: f64 = 2.5;
-/// Turn of the tip on the same path \[rad\].
+/// Rotation of the tip during the downward move \[rad\].
 const TURN_RAD: f64 = 0.4;
 /// Amplitude and angular frequency of the shoulder's oscillation: 0.25 m/s at the tip, which is 0.6 m away.
 const SWING_RAD: f64 = 0.15;
 const SWING_RAD_PER_S: f64 = 2.8;
-/// Stiffness of the stiff track \[N/m\], if the arm allows it: the most that the built-in WAMs do.
+/// Stiffness of the stiff track \[N/m\], if the arm allows it: the maximum of the built-in WAMs.
 const STIFF_N_PER_M: f64 = 1000.0;
-/// Torque ramp of the breakaway task: its joint still rests at the event \[N m/s\], \[rad\], \[N m\].
+/// Torque ramp of the breakaway task, whose joint has not moved at the event \[N m/s\], \[rad\], \[N m\].
 const RAMP_NM_PER_S: f64 = 0.5;
 const RAMP_STOP_RAD: f64 = 0.03;
 const RAMP_LIMIT_NM: f64 = 6.0;
@@ -48,7 +47,7 @@ pub struct Script<const N: usize> {
     pub start_rad: Vector<N>,
 }
 
-/// Request of the task, for an arm in its start pose.
+/// Returns the request of the task, for an arm in its start pose.
 ///
 /// # Errors
 /// [`Failure::Experiment`] if the arm cannot perform the task.
@@ -98,7 +97,7 @@ pub fn request<const N: usize>(
     })
 }
 
-/// Pose from which the pose task starts \[rad\].
+/// Returns the pose from which the pose task starts \[rad\].
 ///
 /// # Errors
 /// [`Failure::Experiment`] if the arm cannot perform the task.
@@ -106,8 +105,8 @@ pub fn pose_start_rad<const N: usize>(config: &Config<N>) -> Result<Vector<N>, F
     Ok(Approach::to_pose(config, &pose_motion())?.start_rad())
 }
 
-/// Force with which the law itself may press on a block under the path \[N\]: stiffness times the length of the path, of
-/// the tip or of the springs of the joints as they act downwards at the tip. None if the task does not follow a path.
+/// Returns the force with which the law may press on a block under the path \[N\]: stiffness times length of the path, with the
+/// stiffness of the tip, or that of the joints downwards at the tip. None if the task follows no path.
 pub fn law_force_n<const N: usize>(
     task: TestTask,
     config: &Config<N>,
@@ -131,18 +130,19 @@ pub fn law_force_n<const N: usize>(
     }
 }
 
-/// Stiffness of the stiff track \[N/m\].
+/// Returns the stiffness of the stiff track \[N/m\].
 fn stiff_n_per_m<const N: usize>(config: &Config<N>) -> f64 {
     STIFF_N_PER_M.min(config.limits.stiffness_n_per_m)
 }
 
-/// Force with which the weight of an arm without torque rests on a block under its tip \[N\], if the shoulder alone gives way.
+/// Returns the force with which an arm without torque rests on a block under its tip \[N\], if only the shoulder moves.
 pub fn weight_n<const N: usize>(config: &Config<N>, start_rad: &Vector<N>) -> f64 {
     let lever_m = jacobian(&config.arm, start_rad)[(2, SHOULDER)];
     (gravity(&config.arm, start_rad)[SHOULDER] / lever_m).abs()
 }
 
-/// The downward path of the joint impedance task, slower, while the tip turns about the vertical.
+/// Returns the motion of the pose task: the downward path of the joint impedance task, slower, while the tip rotates about the
+/// vertical.
 fn pose_motion() -> PoseMotion {
     let from_m = scenario::sinusoid(1.0).0.at(0.0).position;
     PoseMotion {
@@ -161,8 +161,8 @@ fn pose_motion() -> PoseMotion {
 }
 
 impl<const N: usize> Script<N> {
-    /// Requests that move the arm from the home pose to the start pose and start the task, and the request that is or
-    /// prepares the event.
+    /// Creates the requests that move the arm from the home pose to the start pose and start the task, and the request that is
+    /// or prepares the event.
     ///
     /// # Errors
     /// [`Failure::Experiment`] if the arm cannot perform the task.
@@ -190,7 +190,7 @@ impl<const N: usize> Script<N> {
             event_cycle: task_start_cycle
                 + cycles(match spec.task {
                     TestTask::GravityHold | TestTask::Float => 0.3,
-                    // In the tasks below, the event comes near the highest speed of the motion.
+                    // In the tasks below, the event is near the highest speed of the motion.
                     TestTask::Move => 0.6,
                     TestTask::JointImpedance => 0.8,
                     TestTask::TrackPose => 1.0,
@@ -201,7 +201,7 @@ impl<const N: usize> Script<N> {
             start_rad: approach.start_rad(),
         };
         if let Event::Injected {
-            when: When::InTheTask(after_ms),
+            when: FaultTime::InTheTask(after_ms),
             ..
         } = spec.event
         {
@@ -241,7 +241,7 @@ impl<const N: usize> Script<N> {
         if spec.task == TestTask::TrackStiff {
             let gains = scenario::gains_like(&config.law.gains, stiff_n_per_m(config));
             let request = Request::Gains { gains, ramp_s: 0.0 };
-            // Before the request of the task, of which a cycle takes one.
+            // The request is sent before that of the task, because one request is executed per cycle.
             script.requests.push((task_start_cycle - 1, request));
         }
         script

@@ -8,9 +8,9 @@ use supple_cli::exit::Failure;
 use supple_ipc::Domain;
 use supple_model::Description;
 
-/// Arm of the pose mode if the one of the command line has too few joints.
+/// Arm of the pose mode if the arm of the command line has too few joints.
 const POSE_ARM: &str = "wam7";
-/// Joints that the pose mode needs.
+/// Number of joints that the pose mode needs.
 const POSE_JOINTS: usize = 6;
 /// Control rate of the pose mode on the emulated bus \[Hz\].
 const POSE_BUS_RATE_HZ: u32 = 700;
@@ -18,13 +18,13 @@ const POSE_BUS_RATE_HZ: u32 = 700;
 /// The arm of a test case.
 pub(super) struct TestArm {
     pub(super) description: Description,
-    /// Built-in arm or path, for the processes.
+    /// Name or path of the arm, for the processes.
     pub(super) name: String,
     pub(super) strict: bool,
     pub(super) rate_hz: Option<u32>,
 }
 
-/// The arm of the command line, and the one of the pose mode.
+/// The arm of the command line, and the arm of the pose mode.
 pub(super) struct TestArms {
     pub(super) general: TestArm,
     pub(super) pose: TestArm,
@@ -33,8 +33,8 @@ pub(super) struct TestArms {
 }
 
 impl TestArms {
-    /// The pose mode needs six active joints: it has the arm of the command line, or else [`POSE_ARM`], without held
-    /// joints. The copy without held joints is in a folder of its own until the end.
+    /// Creates the arms. The pose mode needs six active joints: it uses the arm of the command line, otherwise [`POSE_ARM`],
+    /// without held joints. The copy without held joints is in a temporary folder until the end.
     pub(super) fn new(args: &DrillArgs) -> Result<TestArms, Failure> {
         let description = arms::find(&args.urdf.name(&args.arm), args.strict)?;
         let free = match description.dof() >= POSE_JOINTS {
@@ -66,7 +66,7 @@ impl TestArms {
         if spec.task != TestTask::TrackPose {
             return &self.general;
         }
-        // Seven motors do not fit into a millisecond of the bus.
+        // The frames of seven motors do not fit into one millisecond.
         self.pose.rate_hz = (spec.plant == PlantKind::Emu).then_some(POSE_BUS_RATE_HZ);
         &self.pose
     }
@@ -74,7 +74,7 @@ impl TestArms {
 
 impl Drop for TestArms {
     fn drop(&mut self) {
-        // A copy that cannot be removed does no harm.
+        // Errors are ignored: a copy that remains has no effect.
         let _ = std::fs::remove_dir_all(&self.folder);
     }
 }

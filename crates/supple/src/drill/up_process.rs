@@ -11,7 +11,7 @@ use supple_cli::exit::Failure;
 pub struct Up(Child);
 
 impl Up {
-    /// Starts it; `reports` takes what it and its processes write on standard error.
+    /// Starts `supple up`; it and its processes write their standard error to `reports`.
     ///
     /// # Errors
     /// [`Failure::File`].
@@ -29,12 +29,12 @@ impl Up {
             .map_err(|error| Failure::file("start", &this, error))
     }
 
-    /// Its process.
+    /// Returns the id of the process.
     pub fn process(&self) -> Pid {
         Pid::from_child(&self.0)
     }
 
-    /// Sends it a signal.
+    /// Sends a signal to the process.
     pub fn signal(&self, signal: Signal) {
         // Ignore errors: the process may have exited already.
         let _ = kill_process(self.process(), signal);
@@ -50,7 +50,7 @@ impl Up {
 
 impl Drop for Up {
     fn drop(&mut self) {
-        // The processes that it started terminate with it.
+        // The processes that it started end with it.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }

@@ -1,18 +1,18 @@
-//! Questions to motors, one at a time.
+//! Sends requests to motors, one motor at a time.
 
 use supple_bus::{Address, Bus, BusError, Event, OwnerFolder, PacedBus, SocketCan};
 use supple_can_frame::FrameFormat;
 use supple_cli::exit::Failure;
 use supple_damiao::register::{self, Operation};
-use supple_damiao::{Feedback, Frame, Register, RegisterReply, Special, Value, flash};
+use supple_damiao::{Feedback, Frame, Register, RegisterReply, SpecialCommand, Value, flash};
 use supple_model::{BusDescription, BusFormat};
 
-/// Time for which answers are collected \[ns\]: a host in real time is not always scheduled within a millisecond.
+/// Time for which replies are collected \[ns\]; a host in real time is not always scheduled within a millisecond.
 const ANSWER_NS: u64 = 10_000_000;
-/// Time of a motor to store its registers \[ns\].
+/// Time that a motor needs to store its registers \[ns\].
 const STORE_NS: u64 = 50_000_000;
-/// Questions until a motor counts as silent.
-const TRIES: usize = 3;
+/// Number of requests after which a motor counts as silent.
+const MAX_ATTEMPTS: usize = 3;
 
 /// The bus of an arm whose motors are disabled.
 pub(super) struct MotorBus {
@@ -55,8 +55,8 @@ impl MotorBus {
         }
     }
 
-    /// Sends a frame and collects what arrives until `for_ns` have passed, or `enough` returns true.
-    fn ask(
+    /// Sends a frame and collects received frames until `for_ns` have passed, or `enough` returns true.
+    fn exchange(
         &mut self,
         frame: &Frame,
         for_ns: u64,
@@ -84,10 +84,10 @@ impl MotorBus {
         }
     }
 
-    /// All feedback to a request, with the ids that it came with: none, or one, or two motors with one id.
+    /// Requests feedback; returns all replies with their ids: none, one, or two if two motors have the same id.
     pub fn feedback(&mut self, id: u8) -> Result<Vec<(u16, Feedback)>, Failure> {
-        for _ in 0..TRIES {
-            let frames = self.ask(&register::ask_feedback(id), ANSWER_NS, &|_| false)?;
+        for _ in 0..MAX_ATTEMPTS {
+            let frames = self.exchange(&register::request_feedback(id), ANSWER_NS, &|_| false)?;
             let found: Vec<_> = frames
                 .iter()
                 .filter_map(|frame| Some((frame.id(), Feedback::of_motor(frame, id).ok()?)))
@@ -99,12 +99,12 @@ impl MotorBus {
         Ok(Vec::new())
     }
 
-    /// Value of a register; `None` if the motor does not answer.
+    /// Reads a register; returns `None` if the motor does not answer.
     pub fn read(&mut self, id: u8, register: Register) -> Result<Option<Value>, Failure> {
         let parse = |frame: &Frame| RegisterReply::parse(frame, id, Operation::Read, register);
-        for _ in 0..TRIES {
+        for _ in 0..MAX_ATTEMPTS {
             let frame = register::read(id, register);
-            let frames = self.ask(&frame, ANSWER_NS, &|frame| parse(frame).is_some())?;
+            let frames = self.exchange(&frame, ANSWER_NS, &|frame| parse(frame).is_some())?;
             if let Some(reply) = frames.iter().find_map(parse) {
                 return Ok(Some(reply.value()));
             }
@@ -112,8 +112,8 @@ impl MotorBus {
         Ok(None)
     }
 
-    /// Writes a register, twice because some motors ignore the first write, and reads it back. A new id is asked for under
-    /// that id.
+    /// Writes a register, twice because some motors ignore the first write, and reads it back. A new id is read
+    /// back under that id.
     pub fn write(
         &mut self,
         id: u8,
@@ -124,7 +124,7 @@ impl MotorBus {
             problem: format!("motor {id}: {error}"),
         })?;
         for _ in 0..2 {
-            self.ask(&frame, ANSWER_NS, &|_| true)?;
+            self.exchange(&frame, ANSWER_NS, &|_| true)?;
         }
         let id = match (register, value) {
             (Register::ID, Value::Integer(new)) => u8::try_from(new).unwrap_or(id),
@@ -135,13 +135,13 @@ impl MotorBus {
 
     /// Clears a latched error.
     pub fn clear_error(&mut self, id: u8) -> Result<(), Failure> {
-        self.ask(&Special::ClearError.emit(id), ANSWER_NS, &|_| true)
+        self.exchange(&SpecialCommand::ClearError.emit(id), ANSWER_NS, &|_| true)
             .map(|_| ())
     }
 
     /// Stores all registers of a motor in its flash.
     pub fn store(&mut self, id: u8) -> Result<(), Failure> {
-        self.ask(&flash::store_all(id), STORE_NS, &|_| false)
+        self.exchange(&flash::store_all(id), STORE_NS, &|_| false)
             .map(|_| ())
     }
 }

@@ -1,14 +1,14 @@
-//! `supple motors`: lists the drives of an arm on their bus and, asked explicitly, sets registers.
+//! `supple motors`: lists the motors of an arm on their bus and, on explicit request, sets registers.
 //!
-//! It compares each motor with the arm's file, as a start-up does. It never enables a motor, never commands a torque,
-//! and refuses to work while a motor is enabled. It writes flash only with `--store`, of one motor.
+//! The command compares each motor with the arm's TOML, as start-up does. It never enables a motor, never commands a torque,
+//! and fails if a motor is enabled. It writes flash only with `--store`, of one motor.
 
 mod bus;
 mod report;
 
 use crate::cli::MotorsArgs;
 use bus::MotorBus;
-use report::{Line, Report, describe};
+use report::{MotorReport, Report, describe};
 use supple_bus::Address;
 use supple_cli::arms;
 use supple_cli::console::{print_json, print_line, print_status};
@@ -21,7 +21,7 @@ use supple_model::{BusDescription, BusMotor};
 /// Runs `supple motors`.
 ///
 /// # Errors
-/// [`Failure`]: an arm without `[bus]`, a bus that cannot be used, a register that is not set, motors that do not fit.
+/// [`Failure`] if the arm has no `[bus]`, the bus cannot be used, a register was not set, or a motor does not match the arm.
 pub fn run(args: &MotorsArgs) -> Result<(), Failure> {
     let description = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     let Some(described) = description.bus() else {
@@ -69,7 +69,7 @@ pub fn run(args: &MotorsArgs) -> Result<(), Failure> {
     let problems: Vec<String> = report
         .motors
         .iter()
-        .filter_map(|line: &Line| line.problem.clone())
+        .filter_map(|line: &MotorReport| line.problem.clone())
         .collect();
     match problems.is_empty() {
         true => Ok(()),
@@ -79,7 +79,7 @@ pub fn run(args: &MotorsArgs) -> Result<(), Failure> {
     }
 }
 
-/// The motors to list: one, or all.
+/// Returns the motors to list: one, or all.
 fn selected<'a>(
     described: &'a BusDescription,
     args: &MotorsArgs,
@@ -108,13 +108,13 @@ fn assignment(text: &str) -> Result<(&'static RegisterInfo, Value), Failure> {
         .split_once('=')
         .ok_or_else(|| wrong("give NAME=VALUE, as in TIMEOUT=400".to_owned()))?;
     let by_number = name.parse().ok().and_then(|number| Register(number).info());
-    let info = by_number.or(Register::named(name)).ok_or_else(|| {
+    let info = by_number.or(Register::by_name(name)).ok_or_else(|| {
         let writable = REGISTERS
             .iter()
             .filter(|info| info.access == Access::Writable);
         let names: Vec<&str> = writable.map(|info| info.name).collect();
         wrong(format!(
-            "no register has this name; writable are {}",
+            "no register has this name; the writable registers are {}",
             names.join(", ")
         ))
     })?;
@@ -144,7 +144,7 @@ fn assignment(text: &str) -> Result<(&'static RegisterInfo, Value), Failure> {
     Ok((info, value))
 }
 
-/// Registers are not read or written beside another host.
+/// Fails if a motor is enabled: another host may then be using the bus.
 fn refuse_enabled(bus: &mut MotorBus, motor: &BusMotor) -> Result<(), Failure> {
     let answers = bus.feedback(motor.id as u8)?;
     let enabled = answers
@@ -155,14 +155,14 @@ fn refuse_enabled(bus: &mut MotorBus, motor: &BusMotor) -> Result<(), Failure> {
         true => Err(Failure::Motors {
             problem: Refusal {
                 motor: motor.id as u8,
-                problem: Problem::Enabled,
+                problem: Problem::AlreadyEnabled,
             }
             .to_string(),
         }),
     }
 }
 
-/// Clears an error, sets registers and stores them, as asked.
+/// Clears an error, sets registers and stores them, as requested.
 fn change(
     bus: &mut MotorBus,
     motor: &BusMotor,

@@ -1,4 +1,4 @@
-//! What `supple motors` shows of each motor.
+//! Report of `supple motors`.
 
 use super::bus::MotorBus;
 use comfy_table::{ContentArrangement, Table, presets};
@@ -7,24 +7,24 @@ use std::collections::BTreeMap;
 use supple_bus::Address;
 use supple_cli::console::print_line;
 use supple_cli::exit::Failure;
-use supple_damiao::inspection::{Expectation, Readings, TIMEOUT_UNIT_S, TO_READ};
+use supple_damiao::inspection::{Expectation, RegisterReadings, TIMEOUT_UNIT_S, TO_READ};
 use supple_damiao::register::REGISTERS;
 use supple_damiao::{Problem, Ranges, Register, Value};
 use supple_model::{BusDescription, BusFormat, BusMotor};
 
-/// Difference of the flux between motors of one type that is worth a warning.
+/// Relative difference of the flux between motors of one type above which a warning is printed.
 const FLUX_TOLERANCE: f64 = 0.05;
 
-/// One motor.
+/// Report of one motor.
 #[derive(Debug, Serialize)]
-pub(super) struct Line {
-    /// Id in the arm's file.
+pub(super) struct MotorReport {
+    /// Id in the arm's TOML.
     pub id: u16,
     /// Joint.
     pub joint: String,
-    /// Type in the arm's file.
+    /// Type in the arm's TOML.
     pub model: String,
-    /// State; `None` without an answer.
+    /// Status; `None` if the motor did not answer.
     pub state: Option<String>,
     /// Firmware, four digits.
     pub firmware: Option<String>,
@@ -44,33 +44,33 @@ pub(super) struct Line {
     pub torque_constant: Option<f64>,
     /// Pole pairs.
     pub pole_pairs: Option<u32>,
-    /// Flux \[Wb\]: with pole pairs and gear ratio the scale of the torque.
+    /// Flux \[Wb\]; together with pole pairs and gear ratio, it determines the torque scale.
     pub flux_wb: Option<f64>,
-    /// All registers by name, if asked for.
+    /// All registers by name, if requested.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub registers: BTreeMap<String, String>,
-    /// Why a start-up would refuse it.
+    /// Reason why start-up would refuse the motor.
     pub problem: Option<String>,
-    /// What it should be looked at for.
+    /// Warning about the motor.
     pub warning: Option<String>,
 }
 
-/// All motors.
+/// Report of all motors.
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
     arm: String,
     bus: String,
     /// Motors, from the base to the tip.
-    pub motors: Vec<Line>,
+    pub motors: Vec<MotorReport>,
 }
 
-/// Asks one motor for everything, and compares it with the arm's file.
+/// Reads all properties of one motor and compares them with the arm's TOML.
 pub(super) fn describe(
     bus: &mut MotorBus,
     described: &BusDescription,
     motor: &BusMotor,
     all_registers: bool,
-) -> Result<Line, Failure> {
+) -> Result<MotorReport, Failure> {
     let id = motor.id as u8;
     let expectation = Expectation {
         id,
@@ -84,7 +84,7 @@ pub(super) fn describe(
         without_watchdog: motor.without_watchdog,
         fd: described.format == BusFormat::Fd,
     };
-    let mut line = Line {
+    let mut line = MotorReport {
         id: motor.id,
         joint: motor.joint.clone(),
         model: motor.model.clone(),
@@ -117,10 +117,10 @@ pub(super) fn describe(
         }
     };
     line.state = Some(feedback.status.to_string());
-    let mut readings = Readings::new();
+    let mut readings = RegisterReadings::new();
     for register in TO_READ {
         if let Some(value) = bus.read(id, register)? {
-            readings.note(register, value.to_bytes());
+            readings.insert(register, value.to_bytes());
         }
     }
     let float = |register| match readings.get(register) {
@@ -157,8 +157,8 @@ pub(super) fn describe(
     let own = line.ranges.and_then(|[p, v, t]| Ranges::new(p, v, t).ok());
     line.position_rad = own.map(|ranges| feedback.position_rad(&ranges));
     let problem = match feedback.status.is_error() {
-        true => Some(Problem::Error(feedback.status)),
-        false if reply_id != motor.reply_id => Some(Problem::ReplyId {
+        true => Some(Problem::MotorError(feedback.status)),
+        false if reply_id != motor.reply_id => Some(Problem::ReplyIdMismatch {
             found: reply_id,
             expected: motor.reply_id,
         }),
@@ -184,7 +184,7 @@ pub(super) fn describe(
 }
 
 impl Report {
-    /// No motors yet.
+    /// Creates a report without motors.
     pub fn new(arm: &str, address: &Address) -> Report {
         Report {
             arm: arm.to_owned(),
@@ -193,7 +193,7 @@ impl Report {
         }
     }
 
-    /// Warns of motors of one type whose identified flux, and with it the torque per command, differs.
+    /// Adds a warning to motors whose identified flux, and therefore torque per command, differs from others of their type.
     pub fn compare_equal_motors(&mut self) {
         let mut by_type: BTreeMap<String, Vec<f64>> = BTreeMap::new();
         for line in &self.motors {
@@ -217,7 +217,7 @@ impl Report {
         }
     }
 
-    /// Prints a table, and below it what is wrong.
+    /// Prints a table, followed by problems and warnings.
     pub fn print(&self) -> Result<(), Failure> {
         let mut table = Table::new();
         table

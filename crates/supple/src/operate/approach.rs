@@ -35,8 +35,8 @@ impl<const N: usize> Approach<N> {
         })
     }
 
-    /// The approach to a trajectory from a measured pose that puts the tip at its start; held joints go to their own angles,
-    /// from which a measured one may differ by a count of its encoder.
+    /// Creates the approach to a trajectory from a measured pose in which the tip is at its start. Held joints move to their held
+    /// angles, from which a measured angle may differ by a count of its encoder.
     pub fn from_pose(config: &Config<N>, trajectory: Trajectory, start_rad: Vector<N>) -> Self {
         Approach {
             trajectory,
@@ -48,8 +48,8 @@ impl<const N: usize> Approach<N> {
         }
     }
 
-    /// The approach to a motion of position and orientation. [`Approach::requests`] gives the trajectory of its position
-    /// alone as the last request.
+    /// Plans the approach to a motion of position and orientation. The last request of [`Approach::requests`] is then the
+    /// trajectory of its position alone.
     ///
     /// # Errors
     /// [`Failure::Experiment`] if the arm cannot perform the motion.
@@ -66,7 +66,7 @@ impl<const N: usize> Approach<N> {
         self.start_rad
     }
 
-    /// Requests from a given pose: the move, the number of cycles to wait, and the trajectory.
+    /// Returns the requests from a given pose: the move, the number of cycles to wait, and the trajectory.
     pub fn requests(&self, from_rad: &Vector<N>) -> (Request<N>, u64, Request<N>) {
         let duration_s = self.duration_s(from_rad);
         let between = ((duration_s + REST_S) / self.config.period_s).round() as u64;

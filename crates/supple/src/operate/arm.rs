@@ -1,4 +1,4 @@
-//! Which arm a command of a running system is for.
+//! Determines the arm for a command to a running system.
 
 use crate::cli::SystemArgs;
 use crate::up::running_arm;
@@ -8,16 +8,16 @@ use supple_ipc::Domain;
 use supple_ipc::message::Telemetry;
 use supple_model::Description;
 
-/// Arm of a system that no `supple up` runs: the default of its processes.
+/// Arm of a system that was not started by `supple up`: the default of its processes.
 const DEFAULT_ARM: &str = "wam4";
 
-/// The arm that a command of a running system is for: the given one, or that of its `supple up`.
+/// Returns the arm for a command to a running system: the given arm, or the arm of its `supple up`.
 pub fn arm_of(domain: &Domain, given: Option<&str>, urdf: &UrdfArgs) -> String {
     let of_system = || running_arm(domain).unwrap_or_else(|| DEFAULT_ARM.to_owned());
     urdf.name(&given.map_or_else(of_system, str::to_owned))
 }
 
-/// As [`arm_of`], by the prefix of the system.
+/// Returns the arm as [`arm_of`] does, from the prefix of the system.
 ///
 /// # Errors
 /// [`Failure::System`].

@@ -1,46 +1,46 @@
-//! `supple at-home`: the operator confirms that an arm which has lost its positions is in its home pose.
+//! `supple at-home`: the operator confirms that an arm that has lost its position reference is in its home pose.
 
-use super::ask::running;
+use super::system_request::running;
 use crate::cli::AtHomeArgs;
 use core::time::Duration;
 use std::time::Instant;
-use supple_cli::console::{confirms, print_json, print_line};
+use supple_cli::console::{confirm, print_json, print_line};
 use supple_cli::exit::Failure;
 use supple_ipc::message::Drives;
 use supple_realtime::pause;
 
-/// Time for the motors to wake after the power is back: the arm asks only then.
-const ASKED_WITHIN: Duration = Duration::from_secs(15);
-/// Time within which an arm that waits has its positions, and replies again.
-const BACK_WITHIN: Duration = Duration::from_secs(5);
+/// Timeout for the arm to wait for the confirmation: its motors must first wake up after the power has returned.
+const REQUEST_TIMEOUT: Duration = Duration::from_secs(15);
+/// Timeout for the arm to set its positions and to reply again.
+const RECOVERY_TIMEOUT: Duration = Duration::from_secs(5);
 const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Runs `supple at-home`.
 ///
 /// # Errors
-/// [`Failure::NotRunning`] without a system; [`Failure::NoArmWaits`] if no arm asks for its home pose, or no longer;
-/// [`Failure::NotConfirmed`] if the operator declines, or without `--yes` where nobody can be asked.
+/// [`Failure::NotRunning`] without a system; [`Failure::NoArmWaits`] if no arm waits for the confirmation, or not any more;
+/// [`Failure::NotConfirmed`] if the operator declines, or without both a terminal and `--yes`.
 pub fn at_home(args: &AtHomeArgs) -> Result<(), Failure> {
     let (domain, mut reader, _) = running(&args.system)?;
     let files = domain.home_files();
     let mut pose = None;
-    until(ASKED_WITHIN, || {
-        pose = files.question();
+    poll_until(REQUEST_TIMEOUT, || {
+        pose = files.requested_pose();
         pose.is_some()
     });
     let pose = pose.ok_or(Failure::NoArmWaits)?;
     let question = format!(
-        "is the arm supported in its home pose, {pose}? Its positions are set to that pose; an arm that is elsewhere falls or \
-         strikes."
+        "is the arm supported in its home pose, {pose}? Its positions are then set to that pose; an arm in another pose falls or \
+         hits its surroundings."
     );
-    if !(args.yes || confirms(&question)) {
+    if !(args.yes || confirm(&question)) {
         return Err(Failure::NotConfirmed);
     }
-    // The question is withdrawn if the power is lost once more.
-    files.answer().map_err(|_| Failure::NoArmWaits)?;
+    // The request is removed if the power is lost again.
+    files.confirm().map_err(|_| Failure::NoArmWaits)?;
     let mut back = false;
     let mut failed = None;
-    until(BACK_WITHIN, || {
+    poll_until(RECOVERY_TIMEOUT, || {
         match reader.wait(POLL_INTERVAL) {
             Ok(telemetry) => back = telemetry.is_some_and(|t| t.state.drives() != Drives::Off),
             Err(error) => failed = Some(error),
@@ -60,8 +60,8 @@ pub fn at_home(args: &AtHomeArgs) -> Result<(), Failure> {
     }
 }
 
-/// Polls the condition; false if it does not hold within this time.
-fn until(within: Duration, mut holds: impl FnMut() -> bool) -> bool {
+/// Polls the condition; returns false if it does not hold within this time.
+fn poll_until(within: Duration, mut holds: impl FnMut() -> bool) -> bool {
     let start = Instant::now();
     loop {
         if holds() {

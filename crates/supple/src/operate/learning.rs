@@ -1,6 +1,6 @@
-//! `supple learning`: switches the refinement of the model, and saves what was learned.
+//! `supple learning`: switches the refinement of the model, and saves the learned terms.
 
-use super::ask::{SystemRequest, ask, running};
+use super::system_request::{SystemRequest, running, send_and_print};
 use crate::cli::{LearningAction, SystemArgs};
 use serde::Serialize;
 use std::path::Path;
@@ -9,9 +9,9 @@ use supple_cli::exit::Failure;
 use supple_core::controller::LearningSwitch;
 use supple_model::Description;
 
-/// What was saved, as `--json` prints it.
+/// Result of `learning save`, in the form that `--json` prints.
 #[derive(Serialize)]
-struct Saved<'a> {
+struct SaveResult<'a> {
     folder: &'a Path,
     source: Option<&'a str>,
 }
@@ -27,10 +27,10 @@ pub fn learning(action: &LearningAction) -> Result<(), Failure> {
         LearningAction::Reset(system) => (system, LearningSwitch::Reset),
         LearningAction::Save { folder, system } => return save(system, folder),
     };
-    ask(system, &SystemRequest::Learning(switch))
+    send_and_print(system, &SystemRequest::Learning(switch))
 }
 
-/// Copies the arm that the controller keeps with what it has learned.
+/// Copies the description of the arm with the learned terms, which the controller stores.
 fn save(system: &SystemArgs, folder: &Path) -> Result<(), Failure> {
     let (domain, ..) = running(system)?;
     let kept = domain.learned_folder().join("arm.toml");
@@ -42,7 +42,7 @@ fn save(system: &SystemArgs, folder: &Path) -> Result<(), Failure> {
     let source = learned.settings().learned.as_ref();
     let source = source.and_then(|learned| learned.source.as_deref());
     match system.json {
-        true => print_json(&Saved { folder, source }),
+        true => print_json(&SaveResult { folder, source }),
         false => {
             let folder = folder.display();
             let source = source.unwrap_or_default();

@@ -4,17 +4,18 @@
 
 mod approach;
 mod arm;
-mod ask;
 mod at_home;
 mod learning;
 pub mod pendant;
 mod session;
 mod status;
+mod system_request;
 mod teaching;
 
 use arm::{arm_of_system, check_arm};
-use ask::{
-    SystemRequest, TELEMETRY_TIMEOUT, ask, axes, print_mode, print_reply, running, value_count,
+use system_request::{
+    SystemRequest, TELEMETRY_TIMEOUT, axes, print_mode, print_reply, running, send_and_print,
+    value_count,
 };
 
 pub use approach::Approach;
@@ -48,12 +49,12 @@ use supple_realtime::pause;
 /// Cap radius of an arm without a tool \[m\].
 const CAP_M: f64 = 0.02;
 
-/// Interval at which the pidfile of a running system is looked for.
+/// Interval at which the command checks for the pidfile of a running system.
 const PIDFILE_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Result of `supple stop`, as `--json` prints it: the prefix of the system whose shutdown was requested.
 #[derive(Serialize)]
-struct Stopping<'a> {
+struct StopResult<'a> {
     stopping: &'a str,
 }
 
@@ -66,22 +67,22 @@ pub fn mode(args: &ModeArgs) -> Result<(), Failure> {
     match args.mode {
         ModeName::Idle => idle(system),
         ModeName::GravityHold => gravity_hold(system),
-        ModeName::Float => ask(system, &SystemRequest::Float),
-        ModeName::JointImpedance => ask(system, &SystemRequest::JointImpedance(args)),
+        ModeName::Float => send_and_print(system, &SystemRequest::Float),
+        ModeName::JointImpedance => send_and_print(system, &SystemRequest::JointImpedance(args)),
     }
 }
 
-/// Requests gravity hold, unless the plant itself holds an arm without brakes and lays it down: the controller would accept
-/// the request, and the arm would go on sinking.
+/// Requests gravity hold. Fails while the plant holds an arm without brakes and lays it down: the controller would accept the
+/// request, but the arm would continue to sink.
 fn gravity_hold(system: &SystemArgs) -> Result<(), Failure> {
     let (.., telemetry) = running(system)?;
     match telemetry.state.drives() {
         Drives::Held => Err(Failure::ArmIsLaidDown),
-        _ => ask(system, &SystemRequest::GravityHold),
+        _ => send_and_print(system, &SystemRequest::GravityHold),
     }
 }
 
-/// Requests idle over a separate socket that needs no reader or operator slot, no shared memory and no lock.
+/// Requests idle through a separate socket that needs no reader or operator slot, no shared memory and no lock.
 fn idle(system: &SystemArgs) -> Result<(), Failure> {
     let domain = Domain::new(system.prefix.as_deref()).map_err(Failure::system)?;
     match request_idle(&domain, TELEMETRY_TIMEOUT) {
@@ -94,7 +95,7 @@ fn idle(system: &SystemArgs) -> Result<(), Failure> {
     }
 }
 
-/// Requests idle as any other request if its socket does not exist or nobody answers there.
+/// Requests idle in the same way as other modes, if the separate socket does not exist or is not answered.
 fn idle_as_any_request(
     system: &SystemArgs,
     domain: &Domain,
@@ -111,12 +112,14 @@ fn idle_as_any_request(
             },
         });
     }
-    let cause = error.map_or("nobody answers there".to_owned(), |error| error.to_string());
+    let cause = error.map_or("the controller does not answer there".to_owned(), |error| {
+        error.to_string()
+    });
     print_status(&format!(
         "warning: the socket of idle requests, {}, cannot be used: {cause}; idle is requested as any other mode",
         idle_socket(domain).display()
     ));
-    ask(system, &SystemRequest::Idle)
+    send_and_print(system, &SystemRequest::Idle)
 }
 
 /// Runs `supple reset`: clears the latched fault.
@@ -124,11 +127,11 @@ fn idle_as_any_request(
 /// # Errors
 /// [`Failure`].
 pub fn reset(system: &SystemArgs) -> Result<(), Failure> {
-    ask(system, &SystemRequest::Reset)
+    send_and_print(system, &SystemRequest::Reset)
 }
 
-/// Runs `supple gains`: changes stiffness and damping along a ramp, of the tip, or of the joints or the tip's orientation
-/// where their gains are given. Gains that are not given are unchanged; matrices are given as pairs of stiffness and damping.
+/// Runs `supple gains`: changes stiffness and damping along a ramp: those of the tip, of the joints or of the tip's orientation,
+/// depending on the given gains. Gains that are not given are unchanged; matrices are given as pairs of stiffness and damping.
 ///
 /// # Errors
 /// [`Failure`].
@@ -148,7 +151,7 @@ pub fn gains(args: &GainsArgs) -> Result<(), Failure> {
         (false, true) => SystemRequest::RotationalGains(args),
         (false, false) => SystemRequest::Gains(args),
     };
-    ask(&args.system, &request)
+    send_and_print(&args.system, &request)
 }
 
 /// Returns the trajectory and its duration \[s\].
@@ -169,8 +172,8 @@ pub fn trajectory_for(trajectory: UpTrajectory, description: &Description) -> (T
     }
 }
 
-/// Runs `supple track`: moves the arm to the start of a trajectory or of a file's motion and tracks it; a pose starts where
-/// the tip is.
+/// Runs `supple track`: moves the arm to the start of a trajectory or of a file's motion and tracks it; `pose` starts at the
+/// present position of the tip.
 ///
 /// # Errors
 /// [`Failure`].
@@ -179,7 +182,7 @@ pub fn track(args: &TrackArgs) -> Result<(), Failure> {
     let trajectory = match &args.trajectory {
         TrackTarget::Named(trajectory) => *trajectory,
         TrackTarget::File(file) => {
-            return teaching::perform(&teaching::Performance {
+            return teaching::perform(&teaching::Playback {
                 file,
                 speed: args.speed,
                 arm: &arm()?,
@@ -195,13 +198,13 @@ pub fn track(args: &TrackArgs) -> Result<(), Failure> {
         return Err(value_count("--rotate", args.rotate.len(), none));
     }
     if trajectory == TrackTrajectory::Pose {
-        return ask(&args.system, &SystemRequest::Pose(args));
+        return send_and_print(&args.system, &SystemRequest::Pose(args));
     }
     let arm = arm()?;
     let description = arms::find(&arm, args.strict)?;
     let paths = description.paths();
     let (trajectory, duration_s) = match trajectory {
-        TrackTrajectory::Pose => return ask(&args.system, &SystemRequest::Pose(args)),
+        TrackTrajectory::Pose => return send_and_print(&args.system, &SystemRequest::Pose(args)),
         TrackTrajectory::Sinusoid => paths.sinusoid(args.speed),
         TrackTrajectory::Arc => paths.arc(args.speed),
         TrackTrajectory::Quadrant => {
@@ -265,7 +268,7 @@ pub fn stop(system: &SystemArgs) -> Result<(), Failure> {
     let domain = Domain::new(system.prefix.as_deref()).map_err(Failure::system)?;
     let start = Instant::now();
     while !stop_running(&domain)? {
-        // `supple up` creates a pidfile that something has removed anew.
+        // `supple up` creates its pidfile again if another program has removed it.
         if !idle_socket_is_open(&domain) || start.elapsed() > TELEMETRY_TIMEOUT {
             return Err(Failure::NotRunning {
                 prefix: domain.prefix().to_owned(),
@@ -274,7 +277,7 @@ pub fn stop(system: &SystemArgs) -> Result<(), Failure> {
         pause(PIDFILE_INTERVAL);
     }
     match system.json {
-        true => print_json(&Stopping {
+        true => print_json(&StopResult {
             stopping: domain.prefix(),
         }),
         false => Ok(()),
@@ -283,7 +286,7 @@ pub fn stop(system: &SystemArgs) -> Result<(), Failure> {
 
 #[cfg(test)]
 mod tests {
-    use super::ask::{axes, matrix};
+    use super::system_request::{axes, matrix};
     use supple_cli::exit::Failure;
 
     const NOW: [f64; 3] = [1.0, 2.0, 3.0];
@@ -312,7 +315,7 @@ mod tests {
     #[test]
     fn gains_are_one_value_or_one_per_axis() {
         let read = |given: &[f64]| axes("--stiffness", given, NOW).map(<[f64; 3]>::from);
-        assert_eq!(read(&[]).expect("what is in force"), NOW);
+        assert_eq!(read(&[]).expect("the present gains"), NOW);
         assert_eq!(read(&[7.0]).expect("all axes"), [7.0; 3]);
         assert_eq!(read(&[7.0, 8.0, 9.0]).expect("by axis"), [7.0, 8.0, 9.0]);
         for given in [&[7.0, 8.0][..], &[7.0, 8.0, 9.0, 10.0]] {

@@ -1,4 +1,5 @@
-//! The pendant of an emulated arm: a socket in the folder of its bus; each text line is answered by one line of JSON.
+//! Client of the pendant of an emulated arm: a socket in the folder of the bus, which answers each text line with one line of
+//! JSON.
 
 use crate::cli::PendantAction;
 use core::time::Duration;
@@ -42,7 +43,7 @@ struct Refusal {
 }
 
 impl Pendant {
-    /// Pendant of the emulated arm on this bus; `None` for a CAN interface, whose pendant is real hardware.
+    /// Returns the pendant of the emulated arm on this bus; `None` for a CAN interface, whose pendant is real hardware.
     pub fn of(bus: &Address) -> Option<Pendant> {
         match bus {
             Address::Folder(folder) => Some(Pendant {
@@ -80,7 +81,7 @@ impl Pendant {
         self.send_line(button).map(|_| ())
     }
 
-    /// All events of the arm since it started.
+    /// Returns all events of the arm since its start.
     ///
     /// # Errors
     /// [`Failure::Pendant`].

@@ -32,7 +32,7 @@ impl<const N: usize> OperatorSession<N> {
         OperatorSession::of(domain, OperatorClient::new(domain))
     }
 
-    /// As [`OperatorSession::new`], for a program that runs the system.
+    /// Joins a system as [`OperatorSession::new`] does, for a program that runs the system.
     ///
     /// # Errors
     /// [`Failure::System`].
@@ -78,8 +78,8 @@ impl<const N: usize> OperatorSession<N> {
             .map_err(Failure::system)
     }
 
-    /// The reply to a request of [`OperatorSession::begin_request`], if the controller has carried it out. Replies to other
-    /// requests are discarded.
+    /// Returns the reply to a request of [`OperatorSession::begin_request`], if the controller has executed it. Discards replies to
+    /// other requests.
     ///
     /// # Errors
     /// [`Failure::Refused`] with the controller's reason.
@@ -95,11 +95,11 @@ impl<const N: usize> OperatorSession<N> {
         Ok(None)
     }
 
-    /// Sends a request that no idle request may precede: it is for the first cycle, and the controller refuses it if idle was
-    /// accepted in that cycle or since. Waits until it is carried out.
+    /// Sends a request that must not follow an idle request: it is for the first cycle, so that the controller refuses it if idle
+    /// was accepted in that cycle or later. Waits until it is executed.
     ///
     /// # Errors
-    /// As [`OperatorSession::send_request`].
+    /// The same as those of [`OperatorSession::send_request`].
     pub fn send_first_request(&mut self, request: &Request<N>) -> Result<OperatorReply, Failure> {
         let sequence = self.begin_request(request, Some(0))?;
         let sequence = sequence.ok_or_else(|| self.not_running())?;
@@ -113,11 +113,11 @@ impl<const N: usize> OperatorSession<N> {
         Err(self.not_running())
     }
 
-    /// As [`OperatorSession::send_request`], but waits for a controller that may still be starting; `check` fails if
-    /// it cannot start any more.
+    /// Sends a request as [`OperatorSession::send_request`] does, but waits for a controller that may still be starting; `check`
+    /// fails if the controller cannot start any more.
     ///
     /// # Errors
-    /// As [`OperatorSession::send_request`], and the errors of `check`.
+    /// The same as those of [`OperatorSession::send_request`], and the errors of `check`.
     pub fn send_request_when_ready(
         &mut self,
         request: &Request<N>,
@@ -145,7 +145,7 @@ impl<const N: usize> OperatorSession<N> {
     /// Requests the approach and then the trajectory, from `start_cycle` or immediately.
     ///
     /// # Errors
-    /// As [`OperatorSession::send_request`].
+    /// The same as those of [`OperatorSession::send_request`].
     pub fn follow(
         &mut self,
         approach: &Approach<N>,
@@ -163,12 +163,12 @@ impl<const N: usize> OperatorSession<N> {
         self.queue(&along, start_cycle + between)
     }
 
-    /// Number of queued requests that have not been carried out.
+    /// Number of queued requests that have not been executed.
     pub fn pending(&self) -> usize {
         self.pending_requests.len()
     }
 
-    /// Whether queued requests have not been carried out.
+    /// Whether any queued request has not been executed.
     pub fn is_pending(&self) -> bool {
         !self.pending_requests.is_empty()
     }
@@ -193,10 +193,10 @@ impl<const N: usize> OperatorSession<N> {
         Ok(done)
     }
 
-    /// Waits until every request is executed; returns the reply to the last.
+    /// Waits until every request is executed; returns the reply to the last request.
     ///
     /// # Errors
-    /// As [`OperatorSession::send_request`].
+    /// The same as those of [`OperatorSession::send_request`].
     pub fn wait_for_all(&mut self, within: Duration) -> Result<OperatorReply, Failure> {
         let start = Instant::now();
         loop {
@@ -214,7 +214,7 @@ impl<const N: usize> OperatorSession<N> {
     /// Sends a request for a future cycle and waits until the controller has queued it.
     ///
     /// # Errors
-    /// As [`OperatorSession::send_request`].
+    /// The same as those of [`OperatorSession::send_request`].
     pub fn queue(&mut self, request: &Request<N>, at_cycle: u64) -> Result<(), Failure> {
         match self
             .operator

@@ -1,6 +1,6 @@
 //! `supple status`: shows the state of a running system.
 
-use super::ask::running;
+use super::system_request::running;
 use crate::cli::SystemArgs;
 use crate::up::{Percentiles, RunStatistics};
 use core::fmt;
@@ -29,9 +29,9 @@ struct Status {
     cycles: u64,
     missed: u64,
     late: u64,
-    /// Torque commands that were discarded: wrong number of joints, or not finite.
+    /// Number of torque commands discarded because they had a wrong number of joints or were not finite.
     unusable: u64,
-    /// Messages that were discarded because their writer is not this system's controller or plant, or because they
+    /// Number of messages discarded because their writer is not this system's controller or plant, or because they
     /// belong to another arm.
     foreign: u64,
     tx_lost: u64,
@@ -48,11 +48,11 @@ struct Status {
     learning: LearningStatus,
 }
 
-/// What is learned and in force, one value per joint.
+/// Learned terms in effect, one value per joint.
 #[derive(Serialize)]
 struct LearningStatus {
     on: bool,
-    /// Why nothing is learned at the moment.
+    /// Reason why learning is paused.
     frozen: Option<&'static str>,
     viscous_nm_s_per_rad: Vec<f64>,
     coulomb_nm: Vec<f64>,
@@ -61,7 +61,7 @@ struct LearningStatus {
     payload_kg: f64,
     payload_moment_kg_m: [f64; 3],
     tilt_rad: [f64; 3],
-    /// Torque of all that is learned.
+    /// Torque of all learned terms \[N m\].
     torque_nm: Vec<f64>,
 }
 
@@ -82,7 +82,7 @@ impl LearningStatus {
         }
     }
 
-    /// Whether anything of it is worth a line.
+    /// Whether the status prints the learned terms.
     fn is_in_use(&self) -> bool {
         let parts = [
             &self.viscous_nm_s_per_rad,
@@ -132,7 +132,8 @@ impl fmt::Display for LearningStatus {
 /// Reads telemetry for half a second and prints the status.
 ///
 /// # Errors
-/// [`Failure::NotRunning`] if no system is running; [`Failure::SystemInFault`] after it is printed, if a fault is latched.
+/// [`Failure::NotRunning`] if no system is running; [`Failure::SystemInFault`] after the status is printed, if a fault is
+/// latched.
 pub fn status(system: &SystemArgs) -> Result<(), Failure> {
     let (_, mut reader, mut last) = running(system)?;
     let mut statistics = RunStatistics::default();
@@ -184,10 +185,10 @@ impl Status {
     }
 }
 
-/// Three numbers of at most six decimals: a ramp ends at 1.4999999999999998 where a person set 1.5.
+/// Formats three numbers with at most six decimals, because a ramp to 1.5 may end at 1.4999999999999998.
 fn axes(values: &[f64; 3]) -> String {
     let values = values.map(|value| {
-        // Adding zero makes a zero of -0.
+        // Adding zero converts -0 to 0.
         let rounded = (value * 1e6).round() / 1e6 + 0.0;
         rounded.to_string()
     });
@@ -248,7 +249,7 @@ mod tests {
     use super::axes;
 
     #[test]
-    fn gains_have_no_noise_of_rounding() {
+    fn gains_are_printed_without_rounding_errors() {
         assert_eq!(axes(&[1.4999999999999998, 5.0, -0.0]), "[1.5, 5, 0]");
     }
 }

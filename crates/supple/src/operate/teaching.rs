@@ -1,10 +1,10 @@
-//! `supple teach`, `supple play` and `supple track FILE`: motions that were shown by hand or are given as points.
+//! `supple teach`, `supple play` and `supple track FILE`: motions that are taught by hand or given as points.
 //!
-//! A motion is repeated as set-points that wait in the controller for their cycle, so that neither this process nor the
-//! machine's load is in the motion. If this process ends, the reference comes to rest behind the last of them.
+//! A motion is repeated as set-points that wait in the controller for their cycle, so that neither this process nor the load of
+//! the machine affects the motion. If this process ends, the reference stops after the last set-point.
 
 use super::arm::{arm_of_system, check_arm};
-use super::ask::{print_mode, running};
+use super::system_request::{print_mode, running};
 use super::{Approach, OperatorSession};
 use crate::cli::{PlayArgs, SystemArgs, TeachArgs};
 use core::time::Duration;
@@ -30,28 +30,28 @@ use supple_model::{Description, with_dof};
 
 /// Time between two samples of a recording \[ns\].
 const SAMPLE_NS: u64 = 5_000_000;
-/// Longest recording \[s\].
+/// Maximum duration of a recording \[s\].
 const MAX_TEACH_S: f64 = 3600.0;
-/// Set-points that wait in the controller, of the 8 that one operator may have there.
+/// Number of set-points that wait in the controller; one operator may have 8.
 const AHEAD: usize = 6;
 /// Time from the request of the hold at the start to the first motion \[s\].
 const LEAD_S: f64 = 0.3;
-/// Time in which the arm comes to rest behind the motion \[s\].
+/// Time in which the arm comes to rest after the motion \[s\].
 const SETTLE_S: f64 = 0.5;
 /// Time without telemetry after which a system counts as ended.
 const SILENCE: Duration = Duration::from_secs(5);
-/// Share of the limits of speed and acceleration with which waypoints are passed.
+/// Fraction of the limits of speed and acceleration with which waypoints are passed.
 const LIMIT_SHARE: f64 = 0.8;
 
-/// Telemetry without a gap in time: an error if the system ends.
-struct Stream<'a> {
+/// Stream of telemetry, which fails if the system ends.
+struct TelemetryStream<'a> {
     reader: &'a mut TelemetryReader,
     prefix: &'a str,
     last: Instant,
 }
 
-impl Stream<'_> {
-    /// The next cycle, or `None` after a short wait.
+impl TelemetryStream<'_> {
+    /// Returns the next cycle, or `None` after a short wait.
     fn next(&mut self) -> Result<Option<Telemetry>, Failure> {
         let next = self.reader.wait(Duration::from_millis(20));
         match next.map_err(Failure::system)? {
@@ -67,22 +67,22 @@ impl Stream<'_> {
     }
 }
 
-/// Result of `supple teach`, as `--json` prints it.
+/// Result of `supple teach`, in the form that `--json` prints.
 #[derive(Serialize)]
-struct Taught<'a> {
+struct TeachResult<'a> {
     file: &'a Path,
     samples: usize,
     duration_s: f64,
-    /// Cycles that the recording lacks.
+    /// Number of cycles missing in the recording.
     lost: u64,
     /// Mode at the end of the recording.
     ended_by: &'static str,
 }
 
-/// Runs `supple teach`: float, and a recording until it is ended.
+/// Runs `supple teach`: enters float and records the motion until it is ended.
 ///
 /// # Errors
-/// [`Failure`]; what was recorded before a fault is written.
+/// [`Failure`]; the recording until a fault is written.
 pub fn teach(args: &TeachArgs) -> Result<(), Failure> {
     supple_files::check_output(&args.file)
         .map_err(|error| Failure::file("create", &args.file, error))?;
@@ -101,7 +101,7 @@ fn teach_sized<const N: usize>(
     let since = session.send_request(&Request::Float, None)?.cycle;
     print_status("the arm floats: guide it by hand; end with Ctrl-C or with another mode");
     let lost_before = reader.lost();
-    let mut stream = Stream {
+    let mut stream = TelemetryStream {
         reader,
         prefix: domain.prefix(),
         last: Instant::now(),
@@ -144,7 +144,7 @@ fn teach_sized<const N: usize>(
     taught
         .write(&args.file)
         .map_err(|error| Failure::Points(Box::new(error)))?;
-    let report = Taught {
+    let report = TeachResult {
         file: &args.file,
         samples: taught.time_s.len(),
         duration_s: taught.duration_s(),
@@ -170,34 +170,34 @@ fn teach_sized<const N: usize>(
 }
 
 /// A motion to repeat on a running system.
-pub struct Performance<'a> {
-    /// Its file.
+pub struct Playback<'a> {
+    /// File of the motion.
     pub file: &'a Path,
-    /// Speed over the shown one, or over that which the limits allow to waypoints.
+    /// Speed relative to the recording, or relative to the speed that the limits allow for waypoints.
     pub speed: f64,
     /// Name or path of the arm.
     pub arm: &'a str,
-    /// Reject a URDF that is not read completely.
+    /// Whether to reject a URDF that is not read completely.
     pub strict: bool,
-    /// Gains to set before the motion: one value, or three.
+    /// Stiffness to set before the motion: one value, or three.
     pub stiffness: &'a [f64],
-    /// Likewise.
+    /// Damping to set before the motion: one value, or three.
     pub damping: &'a [f64],
     /// System to use.
     pub system: &'a SystemArgs,
 }
 
-/// Result of a repetition, as `--json` prints it.
+/// Result of a repetition, in the form that `--json` prints.
 #[derive(Serialize)]
-struct Repeated {
+struct PlaybackResult {
     duration_s: f64,
-    /// Duration over that of the motion as it was shown or timed.
+    /// Ratio of the duration to that of the taught or timed motion.
     slowdown: f64,
     set_points: usize,
-    /// Distance of the tip from the shown motion.
+    /// RMS distance of the tip from the taught motion \[m\].
     rms_error_m: f64,
     max_error_m: f64,
-    /// Cycles compared, and cycles whose telemetry was lost.
+    /// Number of compared cycles, and below of cycles whose telemetry was lost.
     cycles: u64,
     lost: u64,
 }
@@ -205,9 +205,9 @@ struct Repeated {
 /// Runs `supple play`.
 ///
 /// # Errors
-/// As [`perform`].
+/// The same as those of [`perform`].
 pub fn play(args: &PlayArgs) -> Result<(), Failure> {
-    perform(&Performance {
+    perform(&Playback {
         file: &args.file,
         speed: args.speed,
         arm: &arm_of_system(&args.system, args.arm.as_deref(), &args.urdf)?,
@@ -221,8 +221,8 @@ pub fn play(args: &PlayArgs) -> Result<(), Failure> {
 /// Repeats a motion: checks it, moves the arm to its start, then follows it.
 ///
 /// # Errors
-/// [`Failure`]; nothing moves if the controller would refuse any part of the motion.
-pub fn perform(performance: &Performance<'_>) -> Result<(), Failure> {
+/// [`Failure`]; the arm does not move if the controller would refuse any part of the motion.
+pub fn perform(performance: &Playback<'_>) -> Result<(), Failure> {
     let description = arms::find(performance.arm, performance.strict)?;
     let points = read_points(performance.file).map_err(|error| Failure::Points(Box::new(error)))?;
     let (domain, mut reader, telemetry) = running(performance.system)?;
@@ -233,7 +233,7 @@ pub fn perform(performance: &Performance<'_>) -> Result<(), Failure> {
 }
 
 fn perform_sized<const N: usize>(
-    performance: &Performance<'_>,
+    performance: &Playback<'_>,
     description: &Description,
     points: &Points,
     domain: &Domain,
@@ -286,14 +286,14 @@ fn perform_sized<const N: usize>(
         let ramp_s = 0.5;
         session.send_request(&Request::Gains { gains, ramp_s }, None)?;
     }
-    let mut stream = Stream {
+    let mut stream = TelemetryStream {
         reader,
         prefix: domain.prefix(),
         last: Instant::now(),
     };
     let approach = Approach::from_pose(config, repetition.start(), repetition.start_rad);
     session.follow(&approach, &now.position_rad, None)?;
-    // The reply to the last pending request is that of the hold at the start.
+    // The last pending request is the hold at the start of the motion.
     let holds_since = loop {
         stream.next()?;
         if let (Some(reply), false) = (session.check()?, session.is_pending()) {
@@ -334,7 +334,7 @@ fn perform_sized<const N: usize>(
             break telemetry;
         }
     };
-    let report = Repeated {
+    let report = PlaybackResult {
         duration_s: (end_cycle - start_cycle) as f64 * config.period_s,
         slowdown: repetition.slowdown,
         set_points: repetition.len(),

@@ -26,18 +26,18 @@ const FORK_LOCK_GRACE: Duration = Duration::from_millis(200);
 /// Poll interval while waiting for a process to exit.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
-/// The child processes; those that still run when this is dropped are killed.
+/// The child processes; dropping this value kills those that still run.
 #[derive(Debug, Default)]
 pub struct ChildProcesses {
     running: Vec<(&'static str, Child)>,
     /// Programs that have exited, with their exit status.
     ended: Vec<(&'static str, ExitStatus)>,
-    /// Takes what the processes write on standard error; without it that of this process does.
+    /// File to which the processes write their standard error; without it, they use that of this process.
     reports: Option<File>,
 }
 
 impl ChildProcesses {
-    /// Processes that are started from now on write their standard error to a file.
+    /// Redirects the standard error of all processes that are started later to a file.
     pub fn report_to(&mut self, file: File) {
         self.reports = Some(file);
     }
@@ -85,7 +85,7 @@ impl ChildProcesses {
         Ok(())
     }
 
-    /// Checks that all processes are running. If `may_exit` is set, `may_end` may have exited successfully.
+    /// Checks that all processes are running. With `may_exit`, the program `may_end` may have exited successfully.
     ///
     /// # Errors
     /// [`Failure::ProcessEnded`].
@@ -134,7 +134,7 @@ impl ChildProcesses {
     /// Restarts a program that was killed.
     ///
     /// # Errors
-    /// As [`ChildProcesses::start`].
+    /// The same as those of [`ChildProcesses::start`].
     pub fn restart(&mut self, program: &Program) -> Result<(), Failure> {
         if let Some(index) = self.running.iter().position(|(n, _)| *n == program.name) {
             kill(&mut self.running.remove(index).1);
@@ -281,16 +281,16 @@ impl Pidfile {
 }
 
 impl Pidfile {
-    /// Creates the file anew if something has removed it, such as a program that cleans /tmp: nobody could end the system.
-    /// Without the folder nothing changes; the next call tries again.
+    /// Creates the file again if another program, such as one that cleans /tmp, has removed it, because `supple stop` needs it. If
+    /// the folder is missing, the next call tries again.
     pub fn restore(&mut self) {
         let is_gone = |error: io::Error| error.kind() == io::ErrorKind::NotFound;
         if fs::symlink_metadata(&self.path).is_err_and(is_gone)
-            && let Ok(mut anew) = Pidfile::create(&self.domain, &self.arm)
+            && let Ok(mut replacement) = Pidfile::create(&self.domain, &self.arm)
         {
-            // The old lock ends with `anew`, which must not remove the file.
-            std::mem::swap(&mut self.locked, &mut anew.locked);
-            anew.path = PathBuf::new();
+            // `replacement` now holds the old lock and is dropped; it must not remove the new file.
+            std::mem::swap(&mut self.locked, &mut replacement.locked);
+            replacement.path = PathBuf::new();
         }
     }
 }
@@ -320,7 +320,7 @@ pub fn stop_running(domain: &Domain) -> Result<bool, Failure> {
         .map_err(|error| Failure::file("end the process of", &path, error.into()))
 }
 
-/// Name of the arm of a running system, as `--arm` takes it; `None` if no `supple up` runs it.
+/// Returns the arm of a running system in the form for `--arm`; `None` if the system was not started by `supple up`.
 pub fn running_arm(domain: &Domain) -> Option<String> {
     let path = pidfile_path(domain);
     running(&path)?;
@@ -328,7 +328,7 @@ pub fn running_arm(domain: &Domain) -> Option<String> {
     text.lines().nth(1).map(str::to_owned)
 }
 
-/// PID of the running `supple up` named by the file; `None` if the PID now belongs to another program.
+/// Returns the PID of the running `supple up` from the file; `None` if the PID now belongs to another program.
 fn running(path: &Path) -> Option<Pid> {
     let line = first_line(path)?;
     let process = Pid::from_raw(line.parse().ok()?)?;
@@ -346,7 +346,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_removed_pidfile_is_created_anew_and_locked() {
+    fn a_removed_pidfile_is_created_again_and_locked() {
         let folder = tempfile::tempdir().expect("a folder");
         let domain = Domain::in_folder(&folder.path().join("run"), "pid").expect("a domain");
         let mut pidfile = Pidfile::create(&domain, "my arm").expect("created");

@@ -1,11 +1,11 @@
 //! `supple up`: runs a complete system.
 //!
-//! Starts controller and plant, moves the arm to the start of the sinusoid, tracks it, supervises the processes,
-//! shows progress, writes the log and shuts down in order: first the controller, which sets the drives to idle, then
-//! the plant.
+//! The command starts controller and plant, moves the arm to the start of the sinusoid, tracks it, supervises the processes,
+//! shows progress and writes the log. It shuts down in order: first the controller, which sets the drives to idle, then the
+//! plant.
 //!
-//! An arm on a bus is activated at its pendant after the controller has entered gravity hold: this program presses
-//! the emulated pendant; an operator presses a real one.
+//! An arm on a bus is activated on its pendant after the controller has entered gravity hold: this program presses the
+//! button of an emulated pendant; an operator presses the button of a real pendant.
 
 mod children;
 mod outputs;
@@ -38,9 +38,9 @@ use viewer::Viewer;
 /// Runs `supple up`.
 ///
 /// # Errors
-/// [`Failure`]; [`Failure::RunFault`] after the system is shut down and everything is written.
+/// [`Failure`]; [`Failure::RunFault`] after the system is shut down and all files are written.
 pub fn run(args: &UpArgs) -> Result<(), Failure> {
-    // The other processes get the arm's name with its tip; commands in other folders find it.
+    // The other processes receive the arm's name with its tip in a form that is valid in every folder.
     let args = &UpArgs {
         arm: arms::absolute(&args.urdf.name(&args.arm)),
         ..args.clone()
@@ -52,10 +52,10 @@ pub fn run(args: &UpArgs) -> Result<(), Failure> {
     with_dof!(description.dof(), N => sized::<N>(args, &description))?
 }
 
-/// Replaces this process by the one that owns the bus, which prints its arithmetic.
+/// Replaces this process with the program that owns the bus, which prints the bus time.
 fn show_budget(args: &UpArgs) -> Result<(), Failure> {
     if args.plant == PlantKind::Sim {
-        return print_line("A simulated arm has no bus: --plant emu or --plant can.");
+        return print_line("A simulated arm has no bus: use --plant emu or --plant can.");
     }
     let program = program_beside(PlantKind::Can.clock_owner())?;
     let mut command = std::process::Command::new(&program);
@@ -79,7 +79,7 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
         _ => Ok(None),
     };
     if let Err(failure) = &viewer {
-        print_status(&format!("the arm runs without its page: {failure}"));
+        print_status(&format!("the system runs without the live page: {failure}"));
     }
     let result = started.and_then(|()| system.run_until_end(&stop, &mut pidfile));
     drop(viewer);

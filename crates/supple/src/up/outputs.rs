@@ -1,6 +1,6 @@
-//! Checks of the files that a run is to write, before any process or file is created.
+//! Checks the files that a run will write, before any process or file is created.
 //!
-//! A log is written as `NAME.part` and takes its name at the end: a trace of either name would be lost without a word.
+//! A log is written as `NAME.part` and renamed at the end; it would overwrite a trace with either name without a message.
 
 use std::fs::{File, TryLockError};
 use std::io;
@@ -49,7 +49,7 @@ pub fn check(log: Option<&Path>, trace: Option<&Path>) -> Result<(), Failure> {
     })
 }
 
-/// Whether both paths name one file, which need not exist.
+/// Whether both paths name the same file, which may not exist.
 fn is_same(one: &Path, other: &Path) -> bool {
     match (resolved(one), resolved(other)) {
         (Some(one), Some(other)) => one == other,
@@ -57,7 +57,7 @@ fn is_same(one: &Path, other: &Path) -> bool {
     }
 }
 
-/// The path without symbolic links and `.`; `None` if its folder does not exist.
+/// Returns the path without symbolic links and `.`; `None` if its folder does not exist.
 fn resolved(path: &Path) -> Option<PathBuf> {
     if let Ok(path) = path.canonicalize() {
         return Some(path);
@@ -76,7 +76,7 @@ fn is_being_written(path: &Path) -> bool {
             .is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock)))
 }
 
-/// Opens the file as its writer will, and leaves the folder as it was.
+/// Opens the file as its writer will; removes it if it did not exist.
 fn check_writable(path: &Path) -> io::Result<()> {
     let exists = path.symlink_metadata().is_ok();
     open_output(path)?;
@@ -118,7 +118,7 @@ mod tests {
                 }
             }
             check(Some(&log), Some(&at("trace.csv"))).expect("two files");
-            assert!(!at("trace.csv").exists(), "nothing is left");
+            assert!(!at("trace.csv").exists(), "no file is left");
             if !exists {
                 std::fs::write(&log, "an older log").expect("written");
             }
@@ -133,7 +133,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let at = |name: &str| folder.path().join(name);
         let part = File::create(at("run.mcap.part")).expect("created");
-        // What a crash has left is nobody's.
+        // A file that a crashed writer left is not locked.
         check(None, Some(&at("run.mcap"))).expect("no writer");
         part.lock().expect("locked");
         for trace in ["run.mcap", "run.mcap.part"] {

@@ -38,13 +38,13 @@ pub struct Plan {
     pub arm: Option<Program>,
     /// Pendant of the emulated arm.
     pub pendant: Option<Pendant>,
-    /// The arm has no brakes: the clock owner lays it down before it exits.
+    /// Whether the arm has no brakes, so that the clock owner lays it down before it exits.
     pub lays_down: bool,
 }
 
 /// Time after which the shutdown kills a process.
 pub const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(5);
-/// The same for a clock owner that lays an arm down first.
+/// Time after which the shutdown kills a clock owner that first lays an arm down.
 const LAY_DOWN_TIMEOUT: Duration = Duration::from_secs(70);
 
 impl Plan {
@@ -56,7 +56,7 @@ impl Plan {
         }
     }
 
-    /// Whether an operator activates the drives at a pendant, of the emulated arm or of a real one.
+    /// Whether the drives are activated on a pendant, of an emulated or a real arm.
     pub fn has_pendant(&self, plant: PlantKind) -> bool {
         self.pendant.is_some() || plant == PlantKind::Can && !self.lays_down
     }
@@ -161,7 +161,7 @@ impl PlantKind {
 }
 
 impl UpArgs {
-    /// The defaults of the command line, but without log and page, and with JSON.
+    /// Returns the defaults of the command line, except that there is no log and no page, and the output is JSON.
     pub fn with_defaults(plant: PlantKind, arm: String) -> UpArgs {
         UpArgs {
             urdf: UrdfArgs::default(),
@@ -196,10 +196,10 @@ impl UpArgs {
         (!self.no_log).then(|| self.log.clone())
     }
 
-    /// The arm at the requested rate.
+    /// Returns the arm at the requested rate.
     ///
     /// # Errors
-    /// As [`Description::at_rate`].
+    /// The same as those of [`Description::at_rate`].
     pub fn at_rate(&self, description: Description) -> Result<Description, ModelError> {
         match self.rate_hz {
             Some(rate_hz) => description.at_rate(f64::from(rate_hz)),
@@ -207,8 +207,8 @@ impl UpArgs {
         }
     }
 
-    /// Command-line arguments that start the same system in real time, as far as test cases use them: neither bus, home pose, tare,
-    /// duration nor page.
+    /// Returns the command-line arguments that start the same system in real time. Options that test cases do not use are omitted:
+    /// bus, home pose, tare, duration and page.
     pub fn to_arguments(&self) -> Vec<String> {
         let mut arguments = vec!["up", "--json", "--arm", &self.arm, "--plant"];
         arguments.push(match self.plant {
@@ -260,7 +260,7 @@ impl UpArgs {
         arguments
     }
 
-    /// Plants on a bus have drives for some arms only.
+    /// Fails if the plant is on a bus and has no drives for the arm.
     fn check_drives(&self, description: &Description) -> Result<(), Failure> {
         let plant = match self.plant {
             PlantKind::Sim => return Ok(()),
@@ -291,7 +291,7 @@ impl UpArgs {
         }
     }
 
-    /// The simulated arm's options are checked before any process starts.
+    /// Checks the options of the simulated arm before any process starts.
     fn check_plant_options(&self, description: &Description) -> Result<(), Failure> {
         let given = !self.plant_options.to_arguments().is_empty()
             || self.block_m.is_some()
@@ -301,7 +301,7 @@ impl UpArgs {
             plant => {
                 let hand = self.plant_options.options(description)?.hand;
                 match hand {
-                    // An emulated arm does not know the mode, so that a hand cannot grip it in float alone.
+                    // An emulated arm does not know the mode of the controller, so that a hand cannot grip it only in float.
                     Some(hand) if plant == PlantKind::Emu && hand.when == Grip::Float => {
                         Err(Failure::HandNeedsMode)
                     }
@@ -311,7 +311,7 @@ impl UpArgs {
         }
     }
 
-    /// An option of the bus would be without effect on an arm without one.
+    /// Fails if a bus option, which would have no effect, is given for an arm without a bus.
     fn check_bus_options(&self) -> Result<(), Failure> {
         let options = [
             ("--bus", self.bus.is_some()),

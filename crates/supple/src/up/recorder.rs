@@ -1,4 +1,4 @@
-//! Telemetry into a log, for as long as it can be written: a full disk ends the log, not the arm.
+//! Writes telemetry to a log as long as the log can be written: a full disk ends the log, but not the run.
 
 use std::fs;
 use std::path::Path;
@@ -11,14 +11,14 @@ use supple_log::{CycleTiming, Extras, RunInfo, Writer};
 use supple_model::Description;
 use supple_plant::PlantOptions;
 
-/// The log of a run, if there is one, and why it ended before the run, if it did.
+/// The log of a run, if any, and the reason if it ended before the run.
 pub struct RunLog<const N: usize> {
     recorder: Option<Recorder<N>>,
     ended: Option<Failure>,
 }
 
 impl<const N: usize> RunLog<N> {
-    /// Of a run with a log or without.
+    /// Creates the log of a run, which may have none.
     pub fn new(recorder: Option<Recorder<N>>) -> Self {
         RunLog {
             recorder,
@@ -26,23 +26,23 @@ impl<const N: usize> RunLog<N> {
         }
     }
 
-    /// A cycle.
+    /// Adds a cycle.
     pub fn add(&mut self, telemetry: &Telemetry) {
         self.write(|recorder| recorder.add(telemetry));
     }
 
-    /// Something that happened to the arm, by the clock of its states.
+    /// Adds an event of the arm, with a time of the clock of its states.
     pub fn event(&mut self, stamp_ns: u64, text: &str) {
         self.write(|recorder| recorder.event(stamp_ns, text));
     }
 
-    /// The log is whole, or the reason is reported.
+    /// Completes the log, or reports the reason why it is incomplete.
     pub fn finish(&mut self) {
         let finished = self.recorder.take().map_or(Ok(()), Recorder::finish);
         self.end_with(finished);
     }
 
-    /// Why it ended before the run.
+    /// Returns the reason why the log ended before the run.
     pub fn ended(&mut self) -> Option<Failure> {
         self.ended.take()
     }
@@ -57,7 +57,7 @@ impl<const N: usize> RunLog<N> {
     fn end_with(&mut self, written: Result<(), Failure>) {
         if let Err(failure) = written {
             print_status(&format!(
-                "warning: the log ends here, the arm goes on: {failure}"
+                "warning: the log ends here, the run continues: {failure}"
             ));
             self.recorder = None;
             self.ended = Some(failure);
@@ -65,18 +65,18 @@ impl<const N: usize> RunLog<N> {
     }
 }
 
-/// A log that grows by a record a cycle.
+/// Writer of a log, which adds one record per cycle.
 pub struct Recorder<const N: usize> {
     writer: Writer<N>,
-    /// From the stamps of the states to the time of the log \[ns\].
+    /// Offset from the stamps of the states to the time of the log \[ns\].
     offset_ns: u64,
     virtual_time: bool,
-    /// Latest time written \[ns\]: a log does not go back.
+    /// Latest written time \[ns\]; the times of a log do not decrease.
     latest_ns: u64,
 }
 
 impl<const N: usize> Recorder<N> {
-    /// Begins a log of an arm with these plant options. In virtual time it is the same for the same run: no clock, no timing.
+    /// Creates a log of an arm with these plant options. In virtual time, equal runs give equal logs, without wall-clock times.
     ///
     /// # Errors
     /// [`Failure::File`], [`Failure::Log`].
@@ -114,7 +114,7 @@ impl<const N: usize> Recorder<N> {
         })
     }
 
-    /// A cycle.
+    /// Adds a cycle.
     ///
     /// # Errors
     /// [`Failure::Log`].
@@ -134,7 +134,7 @@ impl<const N: usize> Recorder<N> {
         Ok(self.writer.write_record(self.latest_ns, &record, &extras)?)
     }
 
-    /// Something that happened to the arm, by the clock of its states.
+    /// Adds an event of the arm, with a time of the clock of its states.
     ///
     /// # Errors
     /// [`Failure::Log`].
@@ -144,7 +144,7 @@ impl<const N: usize> Recorder<N> {
             .event(stamp_ns.saturating_add(self.offset_ns), text)?)
     }
 
-    /// The log is whole.
+    /// Completes the log.
     ///
     /// # Errors
     /// [`Failure::Log`].
@@ -156,7 +156,7 @@ impl<const N: usize> Recorder<N> {
 
 #[expect(
     clippy::disallowed_methods,
-    reason = "a log of the wall clock has the time of its start; in virtual time this is not called"
+    reason = "a log in real time contains the time of its start; in virtual time this is not called"
 )]
 fn since_epoch_ns() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);

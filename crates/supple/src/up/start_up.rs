@@ -4,11 +4,11 @@
 //! joining --first state--> gravity hold --drives active--> following
 //!                              |
 //!                              +-- an arm on a bus waits here for its pendant
-//! any of them --mode of somebody else, or a fault--> ended
+//! any of them --mode of another operator, or a fault--> ended
 //! ```
 //!
-//! Whoever requests another mode meanwhile has the last word: nothing is requested or pressed after it. The controller
-//! itself refuses the first gravity hold if idle was accepted before, and the approach once the arm is idle.
+//! If another operator requests a mode during the sequence, it ends: it sends no further request and presses no button. The
+//! controller refuses the first gravity hold if idle was accepted before, and the approach if the arm is idle.
 
 use super::plan::Plan;
 use crate::cli::{PlantKind, UpArgs, UpTrajectory};
@@ -31,21 +31,21 @@ pub const START_S: [f64; 2] = [SETTLE_S, SETTLE_S + GRAVITY_HOLD_S + ACTIVATION_
 /// Stage of the start-up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
-    /// No arm state received yet.
+    /// No arm state has been received.
     Joining,
-    /// Gravity hold since this cycle; the drives are not active yet.
+    /// The controller has been in gravity hold since this cycle; the drives are not active yet.
     GravityHold(u64),
     /// Activation was requested: the emulated pendant was pressed, or the operator was prompted.
     ActivationRequested,
     /// The approach and the trajectory were requested.
     Following,
-    /// The arm tracks, or everything was scheduled in advance.
+    /// The arm tracks, or all requests were scheduled in advance.
     Done,
-    /// Somebody else requested a mode, or a fault was latched.
+    /// Another operator requested a mode, or a fault latched.
     Ended,
 }
 
-/// What the start-up does in a cycle.
+/// Action of the start-up sequence in a cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Action {
     None,
@@ -55,20 +55,20 @@ enum Action {
     Activate,
     /// Requests approach and trajectory.
     Follow,
-    /// Requests nothing any more.
+    /// Ends the sequence.
     End,
 }
 
 impl Stage {
-    /// Action in a cycle with this mode and these drives.
+    /// Returns the action in a cycle with this mode and these drives.
     fn action(self, cycle: u64, mode: Option<Mode>, active: bool, period_s: f64) -> Action {
         let is_foreign = match self {
-            // A fault is reported by the refusal.
+            // The refusal reports the fault.
             Stage::Joining => !matches!(
                 mode,
                 None | Some(Mode::Idle | Mode::GravityHold | Mode::Fault)
             ),
-            // Telemetry of cycles before the request.
+            // This telemetry is of a cycle before the request.
             Stage::GravityHold(since) if cycle < since => return Action::None,
             Stage::GravityHold(_) | Stage::ActivationRequested => mode != Some(Mode::GravityHold),
             Stage::Following => !matches!(
@@ -96,16 +96,16 @@ pub struct StartUp {
     pendant: Option<Pendant>,
     plant: PlantKind,
     track: UpTrajectory,
-    /// A process was restarted: requests before the restart do not count.
+    /// Whether a process was restarted, so that requests before the restart are ignored.
     is_restart: bool,
-    /// The arm has no pendant: its drives become active when gravity hold requests torque.
+    /// Whether the arm has no pendant, so that its drives become active when gravity hold requests torque.
     without_pendant: bool,
-    /// Learning begins with gravity hold.
+    /// Whether to begin learning with gravity hold.
     learn: bool,
     period_s: f64,
-    /// The drives were active while torque was wanted.
+    /// Whether the drives were active while the controller requested torque.
     was_active: bool,
-    /// The drives had no power; true at the start.
+    /// Whether the drives had no power; true at the start.
     was_off: bool,
 }
 
@@ -115,7 +115,7 @@ pub fn cycles_of(time_s: f64, period_s: f64) -> u64 {
 }
 
 impl StartUp {
-    /// Starts the sequence of these processes.
+    /// Creates the sequence for these processes.
     pub fn new(plan: &Plan, args: &UpArgs, period_s: f64) -> StartUp {
         StartUp {
             stage: Stage::Joining,
@@ -131,7 +131,7 @@ impl StartUp {
         }
     }
 
-    /// The sequence after the restart of a process: the caller has requested idle before.
+    /// Creates the sequence after the restart of a process; the caller has requested idle before.
     pub fn after_restart(plan: &Plan, args: &UpArgs, period_s: f64) -> StartUp {
         StartUp {
             is_restart: true,
@@ -139,17 +139,17 @@ impl StartUp {
         }
     }
 
-    /// Whether somebody else requested a mode, or a fault was latched, before the arm tracked.
+    /// Whether another operator requested a mode, or a fault latched, before the arm tracked.
     pub fn is_ended(&self) -> bool {
         self.stage == Stage::Ended
     }
 
-    /// Whether nothing of the sequence is left to do, or all was scheduled in advance.
+    /// Whether the sequence is complete, or was scheduled completely in advance.
     pub fn is_done(&self) -> bool {
         self.stage == Stage::Done
     }
 
-    /// Ends the sequence and says how to go on.
+    /// Ends the sequence and prints how to continue.
     fn end(&mut self, cause: &str, in_fault: bool) {
         self.stage = Stage::Ended;
         let track = match self.track {
@@ -165,13 +165,13 @@ impl StartUp {
             _ => "",
         };
         print_status(&format!(
-            "start-up ends here, {cause}. The system goes on running; `supple up` requests nothing more. To go on: \
+            "start-up ends here, {cause}. The system keeps running; `supple up` sends no further requests. To continue: \
              {reset}`supple mode gravity-hold`, {activate}then `supple {track}`"
         ));
     }
 
-    /// What the operator sees when the drives have become idle although the controller wants torque, as after a stall of
-    /// this machine: once for each time.
+    /// Returns a message for the operator if the drives have become idle although the controller requests torque, for example
+    /// after a stall of this machine. Returns it once for each loss.
     fn lost_drives(&mut self, telemetry: &Telemetry) -> Option<&'static str> {
         let wants_torque = !matches!(
             telemetry.record().mode(),
@@ -185,11 +185,11 @@ impl StartUp {
         if stopped && !self.without_pendant {
             return Some(match self.pendant {
                 Some(_) => {
-                    "emergency stop: the motors have no power. To go on: `supple pendant release`, `supple pendant idle`, \
+                    "emergency stop: the motors have no power. To continue: `supple pendant release`, `supple pendant idle`, \
                      `supple pendant cradle`, `supple at-home`, `supple reset` after a fault, `supple mode gravity-hold`, `supple pendant activate`"
                 }
                 None => {
-                    "emergency stop: the motors have no power. To go on: release the button, press Shift-Idle, put the arm into its \
+                    "emergency stop: the motors have no power. To continue: release the button, press Shift-Idle, move the arm to its \
                      home pose, `supple at-home`, `supple reset` after a fault, `supple mode gravity-hold`, then press Shift-Activate"
                 }
             });
@@ -208,7 +208,7 @@ impl StartUp {
                  `supple pendant activate`"
             }
             PlantKind::Can => {
-                "the drives became idle. To activate them again: `supple mode gravity-hold`, then the arm's pendant"
+                "the drives became idle. To activate them again: `supple mode gravity-hold`, then press Shift-Activate on the pendant"
             }
         })
     }
@@ -280,7 +280,7 @@ impl StartUp {
         Ok(())
     }
 
-    /// Requests gravity hold, and learning.
+    /// Requests gravity hold and, if selected, learning.
     fn hold<const N: usize>(
         &mut self,
         in_fault: bool,
@@ -334,7 +334,7 @@ mod tests {
         }
     }
 
-    /// Whatever else is requested meanwhile, and a fault, end the sequence before anything is pressed or requested.
+    /// Another requested mode, or a fault, ends the sequence before a button is pressed or a request is sent.
     #[test]
     fn another_mode_ends_the_start_up() {
         for mode in [

@@ -43,15 +43,15 @@ pub struct Percentiles {
 /// Summary of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct UpSummary {
-    /// Cycles of the controller.
+    /// Number of cycles of the controller.
     pub cycles: u64,
-    /// Cycles with active drives whose torque command did not arrive in time.
+    /// Number of cycles with active drives whose torque command did not arrive in time.
     pub missed: u64,
-    /// Torque commands that arrived after their cycle.
+    /// Number of torque commands that arrived after their cycle.
     pub late: u64,
-    /// Torque commands that were discarded: wrong number of joints, or not finite.
+    /// Number of torque commands discarded because they had a wrong number of joints or were not finite.
     pub unusable: u64,
-    /// Messages that were discarded because their writer is not this system's controller or plant, or because they
+    /// Number of messages discarded because their writer is not this system's controller or plant, or because they
     /// belong to another arm.
     pub foreign: u64,
     /// Wake-up latency of a cycle.
@@ -62,19 +62,19 @@ pub struct UpSummary {
     pub round_trip_us: Percentiles,
     /// Mean fraction of a cycle in which the bus is busy; 0 without a bus.
     pub bus_load: f64,
-    /// CAN frames whose transmission was not confirmed.
+    /// Number of CAN frames whose transmission was not confirmed.
     pub tx_lost: u64,
     /// Time for which simulated time was paused because the host stalled the plant process.
     pub clock_stall_ms: f64,
-    /// Cycles whose telemetry was lost; they are missing in the log.
+    /// Number of cycles whose telemetry was lost; they are missing in the log.
     pub telemetry_lost: u64,
-    /// RMS distance of the tip from its reference while tracking, from the encoders; none if nothing was tracked.
+    /// RMS distance of the tip from its reference while tracking, computed from the encoders; none if no cycle tracked.
     pub rms_error_m: Option<f64>,
     /// Number of tracked cycles.
     pub tracked_cycles: u64,
     /// Descriptions of the faults that latched.
     pub faults: Vec<String>,
-    /// Why the log or the trace is incomplete; none if both are complete.
+    /// Reason why the log or the trace is incomplete; none if both are complete.
     pub incomplete_output: Option<String>,
     /// Real-time factor: simulated time over wall-clock time; none in real time.
     pub times_real_time: Option<f64>,
@@ -83,7 +83,7 @@ pub struct UpSummary {
 impl Default for RunStatistics {
     fn default() -> Self {
         let histogram = Histogram::new_with_bounds(1, MAX_LATENCY_NS, DIGITS);
-        let histogram = histogram.expect("1 to 10^10 with 3 digits is a histogram");
+        let histogram = histogram.expect("the bounds and digits of the histogram are valid");
         RunStatistics {
             cycles: 0,
             plant: PlantReport::default(),
@@ -120,7 +120,7 @@ impl RunStatistics {
         self.note_fault(telemetry);
     }
 
-    /// Records a latched fault of a cycle that is not otherwise counted.
+    /// Adds a latched fault of a cycle that is not counted otherwise.
     pub fn note_fault(&mut self, telemetry: &Telemetry) {
         if telemetry.record().fault != self.fault && telemetry.record().fault != 0 {
             self.faults.push(telemetry.record().fault_text.to_string());

@@ -1,5 +1,5 @@
-//! What the arm does, on standard error: a line that is updated on a terminal, otherwise one line for each change of mode
-//! or drives.
+//! Shows the state of the arm on standard error: one line that is updated on a terminal, otherwise one line for each change of
+//! mode or drives.
 
 use super::RunStatistics;
 use std::io::IsTerminal;
@@ -14,7 +14,7 @@ const EVERY: u64 = 200;
 #[derive(Debug)]
 pub struct StatusLine {
     output: Output,
-    /// Operators activate the drives at a pendant.
+    /// Whether operators activate the drives on a pendant.
     pendant: bool,
     period_s: f64,
 }
@@ -30,7 +30,7 @@ enum Output {
 }
 
 impl StatusLine {
-    /// Creates the line; `quiet` disables it. Idle drives wait for a pendant where there is one.
+    /// Creates the line; `quiet` disables it. With `pendant`, the line of idle drives shows the button to press.
     pub fn new(quiet: bool, pendant: bool, period_s: f64) -> StatusLine {
         StatusLine {
             output: match (quiet, std::io::stderr().is_terminal()) {
@@ -43,7 +43,7 @@ impl StatusLine {
         }
     }
 
-    /// Shows a cycle: on a terminal every few of them, otherwise those that change mode or drives.
+    /// Shows a cycle: on a terminal every [`EVERY`] cycles, otherwise cycles that change mode or drives.
     pub fn show(&mut self, telemetry: &Telemetry, statistics: &RunStatistics) {
         let (mode, drives) = (telemetry.record().mode(), telemetry.state.drives());
         let name = mode.map_or("unknown", |mode| mode.name());

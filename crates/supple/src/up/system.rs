@@ -22,7 +22,7 @@ use supple_realtime::Stop;
 
 /// Timeout for a process to join the system \[s\].
 const JOIN_TIMEOUT_S: u64 = 20;
-/// Cycle in which learning begins in virtual time: the one after that of the request for gravity hold.
+/// Cycle in which learning begins in virtual time: the cycle after the request for gravity hold.
 const LEARN_CYCLE: u64 = 1;
 /// Interval at which a deleted pidfile is recreated.
 const PIDFILE_CHECK_INTERVAL: Duration = Duration::from_millis(500);
@@ -118,12 +118,12 @@ impl<'a, const N: usize> System<'a, N> {
         self.children.start(&self.plan.clock_owner)
     }
 
-    /// As [`System::start`] in virtual time, with the caller's requests (cycles relative to the first cycle in which
-    /// the approach may begin) and presses of the emulated pendant. Returns the reasons of requests that were refused before
+    /// Starts the processes in virtual time as [`System::start`] does, with the caller's requests (cycles relative to the first
+    /// cycle in which the approach may begin) and presses of the emulated pendant. Returns the reasons of requests that were refused before
     /// their cycle.
     ///
     /// # Errors
-    /// As [`System::start`].
+    /// The same as those of [`System::start`].
     pub fn start_scripted(
         &mut self,
         requests: &[(u64, Request<N>)],
@@ -177,7 +177,7 @@ impl<'a, const N: usize> System<'a, N> {
             .send_request_when_ready(&hold, Some(0), JOIN_TIMEOUT_S, &mut check)
     }
 
-    /// In virtual time: whether the clock owner has run all its cycles.
+    /// Whether the clock owner has run all its cycles, in virtual time.
     ///
     /// # Errors
     /// [`Failure::ProcessEnded`] if it exited with an error.
@@ -186,7 +186,7 @@ impl<'a, const N: usize> System<'a, N> {
             .exited_successfully(self.plan.clock_owner.name)
     }
 
-    /// Reasons of the refusals since the last call.
+    /// Returns the reasons of the refusals since the last call.
     ///
     /// # Errors
     /// If shared memory cannot be accessed.
@@ -243,7 +243,7 @@ impl<'a, const N: usize> System<'a, N> {
                 None => {}
             }
             match self.session.check() {
-                // Refused because an operator has requested another mode meanwhile: not an error.
+                // The request was refused because an operator has requested another mode: this is not an error.
                 Err(Failure::Refused { reason })
                     if self.limit.is_none() || self.wait_whether_start_up_aborts()? =>
                 {
@@ -278,7 +278,7 @@ impl<'a, const N: usize> System<'a, N> {
     /// Waits briefly for the next cycle, processes it and sends the requests that are due.
     ///
     /// # Errors
-    /// As [`System::run_until_end`].
+    /// The same as those of [`System::run_until_end`].
     pub fn poll_and_advance(&mut self) -> Result<Option<Telemetry>, Failure> {
         let Some(telemetry) = self.reader.wait(POLL_INTERVAL).map_err(Failure::system)? else {
             return Ok(None);
@@ -292,7 +292,7 @@ impl<'a, const N: usize> System<'a, N> {
         Ok(Some(telemetry))
     }
 
-    /// As [`System::poll_and_advance`], but sends no requests.
+    /// Waits briefly for the next cycle and processes it, without sending requests.
     ///
     /// # Errors
     /// If shared memory cannot be accessed.
@@ -314,7 +314,7 @@ impl<'a, const N: usize> System<'a, N> {
     /// Terminates the processes in order, even after errors, and collects their last telemetry.
     ///
     /// # Errors
-    /// The first error: shared memory, or a process that cannot be waited for.
+    /// The first error, if shared memory fails or a process cannot be waited for.
     pub fn end(&mut self) -> Result<(), Failure> {
         self.line.end();
         let (reader, run_log, statistics) =
@@ -346,7 +346,7 @@ impl<'a, const N: usize> System<'a, N> {
                 Err(failure) if self.seen.is_some() => {
                     print_status(&format!("the log contains no arm events: {failure}"));
                 }
-                // Nor can one that did not start, whose own failure says more.
+                // A plant that did not start reports no events either; its own error is more informative.
                 Err(_) => {}
             }
         }

@@ -1,5 +1,5 @@
-//! The live page of a system: this program again, as `supple view`. It is no part of the system: nobody waits for it, and the
-//! system goes on without it.
+//! The live page of a system: a second process of this program, `supple view`. The system does not depend on it and continues
+//! without it.
 
 use crate::cli::UpArgs;
 use core::time::Duration;
@@ -12,17 +12,17 @@ use supple_cli::exit::Failure;
 use supple_ipc::Domain;
 use supple_realtime::pause;
 
-/// Time after which a page that does not end is killed.
+/// Time after which the process is killed if it does not end.
 const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(1);
-/// Poll interval while it ends.
+/// Poll interval while the process ends.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
-/// The running program; it is ended when this is dropped.
+/// The process of the page; dropping this value ends it.
 #[derive(Debug)]
 pub struct Viewer(Child);
 
 impl Viewer {
-    /// Starts it. It prints its URL on standard error: standard output is the summary's.
+    /// Starts the process. It prints its URL on standard error, because standard output is for the summary.
     ///
     /// # Errors
     /// [`Failure::File`].

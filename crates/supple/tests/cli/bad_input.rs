@@ -1,11 +1,11 @@
-//! Invalid arguments and outputs of the operator's commands: each gives one error line, the documented exit code and no
-//! output files.
+//! Tests of invalid arguments and outputs of the operator's commands: each gives one error line, the documented exit code and
+//! no output files.
 
 use crate::support::{arg, assert_one_clear_line, fifo, run_in, tree};
 use std::fs;
 use supple_model::Description;
 
-/// Writes nothing to a device: asserts that the device is rejected and unchanged.
+/// A device as output is rejected and unchanged.
 #[cfg(unix)]
 #[test]
 fn outputs_that_are_not_regular_files_are_code_6_before_anything_is_written() {
@@ -97,7 +97,7 @@ fn numbers_out_of_range_are_code_2_with_their_range() {
     assert!(tree(folder.path()).is_empty());
 }
 
-/// The warning is printed once, or the file is rejected; no system runs, so the command fails afterwards.
+/// The warning is printed once, or the file is rejected with --strict; no system runs, so the command then fails.
 #[test]
 fn unread_urdf_elements_are_a_warning_or_an_error_with_strict() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -131,7 +131,7 @@ fn unread_urdf_elements_are_a_warning_or_an_error_with_strict() {
     }
 }
 
-/// The writer of a log renames it when it is complete; a killed one leaves the part.
+/// The writer of a log renames the file when it is complete; a killed writer leaves the incomplete file.
 #[test]
 fn a_log_whose_writer_was_killed_is_found_beside_its_name() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -145,9 +145,9 @@ fn a_log_whose_writer_was_killed_is_found_beside_its_name() {
     }
 }
 
-/// A plant on a bus has no drives for this arm: no process starts.
+/// If a plant on a bus has no drives for the arm, no process starts.
 #[test]
-fn an_arm_without_drives_is_sent_to_the_simulation() {
+fn the_error_of_an_arm_without_drives_suggests_the_simulation() {
     let folder = tempfile::tempdir().expect("a folder");
     for plant in ["emu", "can"] {
         let command = ["up", "--plant", plant, "--arm", "wam3", "--no-log"];
@@ -157,9 +157,9 @@ fn an_arm_without_drives_is_sent_to_the_simulation() {
     }
 }
 
-/// A URDF without a tip: the tip that is taken is named once.
+/// For a URDF without a tip, the selected tip is reported once.
 #[test]
-fn the_default_tip_is_named_once() {
+fn the_default_tip_is_reported_once() {
     let folder = tempfile::tempdir().expect("a folder");
     let built_in = Description::asset("wam4").expect("built in");
     fs::write(folder.path().join("robot.urdf"), built_in.urdf()).expect("written");
@@ -177,7 +177,7 @@ fn the_default_tip_is_named_once() {
     assert!(!answer.stderr.contains(warning), "{}", answer.stderr);
 }
 
-/// The tip of a URDF can be named wherever the arm can.
+/// The tip of a URDF can be given wherever the arm can be given.
 #[test]
 fn a_tip_that_a_urdf_does_not_have_is_code_3() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -199,7 +199,7 @@ fn a_tip_that_a_urdf_does_not_have_is_code_3() {
     }
 }
 
-/// The log, under its own name, through a link, or as the part of a run that was ended, is what it was.
+/// The log is not changed: under its own name, through a link, or as the incomplete file of an ended run.
 #[test]
 fn a_table_is_not_written_over_its_log() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -253,9 +253,9 @@ fn outputs_of_a_run_that_replace_one_another_are_code_6_before_anything_is_writt
     assert_eq!(tree(folder.path()), before, "no additional files");
 }
 
-/// A value of megabytes is not repeated whole.
+/// A message does not repeat a value of megabytes completely.
 #[test]
-fn a_long_value_is_cut_in_the_message() {
+fn a_long_value_is_shortened_in_the_message() {
     let folder = tempfile::tempdir().expect("a folder");
     let value = "x".repeat(2_000_000);
     let csv = format!("time_s,x_m,y_m,z_m\n0,{value},1,2\n");

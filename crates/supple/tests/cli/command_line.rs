@@ -1,4 +1,4 @@
-//! The interface of the command line: help, names, exit codes.
+//! Tests of the command line: help, names, exit codes.
 
 use crate::support::{self, assert_one_clear_line, run};
 use supple_plant::PlantOptions;
@@ -36,7 +36,7 @@ fn help_lists_the_commands_and_the_exit_codes() {
 }
 
 #[test]
-fn an_invalid_command_line_is_code_2_and_does_nothing() {
+fn an_invalid_command_line_exits_with_code_2_and_has_no_effect() {
     for args in [
         &[][..],
         &["dem"],
@@ -78,7 +78,7 @@ fn the_built_in_arms_are_listed() {
     assert_eq!(joints, expected.into());
 }
 
-/// A copy loads, is as the arm, and replaces nothing unless asked to.
+/// A copy can be loaded, equals the arm, and replaces existing files only with --force.
 #[test]
 fn an_arm_is_copied() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -226,7 +226,7 @@ fn the_doctor_lists_every_check_and_its_exit_code_matches() {
     }
 }
 
-/// Below the definitions for other readers of the format a page begins with its title.
+/// After the definitions for other readers of the format, a page begins with its title.
 #[test]
 fn every_manual_page_begins_with_its_title() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -1,4 +1,4 @@
-//! The program `supple`: arguments, results, errors and exit codes.
+//! Tests of the program `supple`: arguments, results, errors and exit codes.
 
 mod support;
 

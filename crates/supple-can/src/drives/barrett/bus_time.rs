@@ -1,8 +1,8 @@
 //! Checks whether the bus bandwidth allows a cycle rate, before the arm is contacted.
 //!
-//! A cycle is a request for positions, a reply of every motor puck, the controller's answer, one or two torque
-//! frames and, in some cycles, one more poll: of the safety module or of the force/torque sensor. Every frame
-//! counts with the maximum number of stuff bits for its length. Positions, torques, the longest auxiliary poll
+//! A cycle consists of a request for positions, a reply of every motor puck, the controller's answer, one or two torque
+//! frames and, in some cycles, an auxiliary poll of the safety module or of the force/torque sensor. The time of every
+//! frame includes the maximum number of stuff bits for its length. Positions, torques, the longest auxiliary poll
 //! and the controller's answer time must fit one period.
 
 use core::fmt;
@@ -13,9 +13,9 @@ const REQUEST_DLC: u8 = 1;
 const MOTOR_REPLY_DLC: u8 = 3;
 const BOTH_REPLY_DLC: u8 = 6;
 const TORQUE_DLC: u8 = 8;
-/// The pendant word has 32 bits.
+/// Data length of the pendant's reply: a 32-bit value.
 const PENDANT_REPLY_DLC: u8 = 6;
-/// Forces, and torques with their status.
+/// Data lengths of the sensor's replies: forces, and torques with their status.
 const SENSOR_REPLY_DLC: [u8; 2] = [6, 7];
 
 /// Worst-case times of a cycle's frames \[ns\].
@@ -27,20 +27,20 @@ pub struct BusTime {
     pub joint_encoders: usize,
     /// Whether a force/torque sensor is polled.
     pub sensor: bool,
-    /// Request for the positions and all replies.
+    /// Time of the request for the positions and of all replies.
     pub positions_ns: u64,
-    /// Torque frames.
+    /// Time of the torque frames.
     pub torques_ns: u64,
-    /// Longest auxiliary poll: request and replies.
+    /// Time of the longest auxiliary poll: request and replies.
     pub auxiliary_poll_ns: u64,
     /// Time reserved for the controller's answer.
     pub answer_ns: u64,
 }
 
-/// A period that is too short.
+/// Error: the period is too short.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Overload {
-    /// Times that must fit.
+    /// Times that must fit into the period.
     pub time: BusTime,
     /// Requested period \[ns\].
     pub period_ns: u64,
@@ -86,7 +86,7 @@ impl fmt::Display for Overload {
 
 impl core::error::Error for Overload {}
 
-/// Bus time of a period, frame by frame.
+/// Bus time of a period, listed frame by frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
     time: BusTime,
@@ -133,13 +133,13 @@ impl fmt::Display for Budget {
     }
 }
 
-/// Number of torque frames; each holds four torques.
+/// Returns the number of torque frames; each frame holds four torques.
 fn torque_frames(joints: usize) -> usize {
     joints.div_ceil(4)
 }
 
 impl BusTime {
-    /// Bus time of an arm with `joints` motor pucks, of which `joint_encoders` also reply with a joint encoder's
+    /// Computes the bus time of an arm with `joints` motor pucks, of which `joint_encoders` also reply with a joint encoder's
     /// position, with or without the sensor; `answer_ns` is reserved for the controller's answer.
     pub fn new(joints: usize, joint_encoders: usize, sensor: bool, answer_ns: u64) -> BusTime {
         let bits = |dlc: u8| u64::from(max_bits(dlc));
@@ -169,13 +169,13 @@ impl BusTime {
         self.positions_ns + self.answer_ns + self.torques_ns + self.auxiliary_poll_ns
     }
 
-    /// Maximum delay of a cycle's start that leaves time for replies, answer and torques \[ns\].
+    /// Returns the maximum delay of a cycle's start that leaves time for replies, answer and torques \[ns\].
     pub fn slack_ns(&self, period_ns: u64) -> u64 {
         let needed_ns = self.positions_ns + self.answer_ns + self.torques_ns;
         period_ns.saturating_sub(needed_ns)
     }
 
-    /// Bus time of a period \[ns\], whether it is long enough or not.
+    /// Returns the listing for a period \[ns\], which may be too short.
     pub fn budget(&self, period_ns: u64) -> Budget {
         Budget {
             time: *self,

@@ -1,4 +1,4 @@
-//! The plant loop of an arm with pucks.
+//! Construction of the plant loop of an arm with Barrett's drives.
 
 use super::drive::Barrett;
 use super::error::CanError;
@@ -7,10 +7,10 @@ use supple_bus::Bus;
 use supple_core::Config;
 use supple_drive::{CycleConfig, Link, PlantLoop};
 
-/// The plant loop of an arm with these drives.
+/// The plant loop of an arm with Barrett's drives.
 pub type Cycle<const N: usize, B, L> = PlantLoop<N, Barrett<N, B>, L>;
 
-/// The plant loop of an arm that has completed start-up.
+/// Creates the plant loop of an arm that has completed start-up.
 ///
 /// # Errors
 /// [`CanError::Overload`] if the period exceeds the bus bandwidth; an error if a puck's firmware lacks a property.

@@ -1,9 +1,9 @@
-//! Barrett's pucks as drives: one request reads all positions, packed frames carry the torques, and the safety module
-//! with its pendant decides whether the motors are active.
+//! Drives of Barrett's arms: one request reads the positions of all pucks, each torque frame carries up to four torques,
+//! and the operator activates the motors on the pendant of the safety module.
 
 use super::bus_time::BusTime;
 use super::error::CanError;
-use super::sensor::Readings;
+use super::sensor::ForceReceiver;
 use super::start_up::Ready;
 use supple_bus::Bus;
 use supple_can_frame::timing::FrameLayout;
@@ -11,7 +11,7 @@ use supple_can_frame::{BitRates, FrameFormat};
 use supple_core::Vector;
 use supple_drive::{
     Budget, BusPort, CycleConfig, Drive, DriveCounters, DriveState, Drives, LoopError, LossReason,
-    Lower, Reading, Received, Reserved, Rest, TipForce,
+    LoweringMode, Reading, Received, ReservedTimes, TipForce, TorqueOffBehaviour,
 };
 use supple_puck::force_torque;
 use supple_puck::property::{get, set};
@@ -22,7 +22,7 @@ use supple_puck::{
 
 /// Period of each auxiliary poll, in bus time \[ns\].
 const AUXILIARY_POLL_PERIOD_NS: u64 = 10_000_000;
-/// Silence of the safety module after which it counts as lost \[ns\].
+/// Time without a reply of the safety module after which it counts as lost \[ns\].
 const MODULE_SILENCE_NS: u64 = 100_000_000;
 
 /// Property ids that the cycle uses.
@@ -35,7 +35,7 @@ struct Ids {
     pendant: PropertyId,
 }
 
-/// What an auxiliary poll requests: the mode of the safety module, the pendant or the force/torque sensor.
+/// Content of an auxiliary poll: the mode of the safety module, the state of the pendant, or the force/torque sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum AuxiliaryPoll {
     Mode,
@@ -43,7 +43,7 @@ enum AuxiliaryPoll {
     Sensor,
 }
 
-/// A WAM on its bus, after start-up.
+/// The drives of a WAM, with their bus, after start-up.
 pub struct Barrett<const N: usize, B> {
     port: BusPort<B>,
     ready: Ready<N>,
@@ -51,7 +51,7 @@ pub struct Barrett<const N: usize, B> {
     bus_time: BusTime,
     /// Position replies of this cycle.
     counts: [Option<Counts>; N],
-    readings: Readings,
+    readings: ForceReceiver,
     /// Last known mode of the safety module, and when it was received \[ns\].
     module: Option<(SafetyMode, u64)>,
     pendant: Option<Pendant>,
@@ -61,7 +61,7 @@ pub struct Barrett<const N: usize, B> {
 }
 
 impl<const N: usize, B: Bus> Barrett<N, B> {
-    /// Drives that have completed start-up.
+    /// Creates the drives of an arm that has completed start-up.
     ///
     /// # Errors
     /// [`CanError::Overload`] if the period exceeds the bus bandwidth; an error if a puck's firmware lacks a property.
@@ -75,7 +75,7 @@ impl<const N: usize, B: Bus> Barrett<N, B> {
         bus_time.check(cycle_config.period_ns)?;
         let motor = ready.pucks[0];
         let property_id = |table: supple_puck::PropertyTable, node: NodeId, property: Property| {
-            table.id(property).ok_or(CanError::Property {
+            table.id(property).ok_or(CanError::UnsupportedProperty {
                 node: node.number(),
                 version: motor.version,
                 property,
@@ -95,7 +95,7 @@ impl<const N: usize, B: Bus> Barrett<N, B> {
             ids,
             bus_time,
             counts: [None; N],
-            readings: Readings::default(),
+            readings: ForceReceiver::default(),
             module: None,
             pendant: None,
             auxiliary_poll: AuxiliaryPoll::Mode,
@@ -112,7 +112,7 @@ impl<const N: usize, B: Bus> Barrett<N, B> {
         self.port.bus_mut()
     }
 
-    /// Gives the bus back.
+    /// Returns the bus.
     pub fn into_bus(self) -> B {
         self.port.into_bus()
     }
@@ -122,13 +122,13 @@ impl<const N: usize, B: Bus> Barrett<N, B> {
         self.pendant.as_ref()
     }
 
-    /// Receives one event until a time; `false` if there was none.
+    /// Receives one event; returns `false` if none arrived until `until_ns`.
     fn receive(&mut self, until_ns: u64, frames: u32) -> Result<bool, LoopError> {
         match self.port.receive(until_ns, frames)? {
             Received::Nothing => return Ok(false),
             Received::Other => {}
             Received::Frame(frame) => {
-                // A malformed frame counts as missing.
+                // A malformed reply counts as a missing reply.
                 if let Ok((from, inbound)) = Inbound::parse(&frame) {
                     let now_ns = self.port.bus().now_ns();
                     self.handle_frame(from, &inbound, now_ns);
@@ -159,7 +159,7 @@ impl<const N: usize, B: Bus> Barrett<N, B> {
             Inbound::Sensor(reading) if from == NodeId::FORCE_TORQUE => {
                 self.readings.update(reading, now_ns);
             }
-            // A frame of the safety module to the motors announces a change of mode: its mode is polled next.
+            // The safety module sends a frame to the motors when it changes its mode: the next poll reads its mode.
             Inbound::Other if from == NodeId::SAFETY => {
                 self.auxiliary_poll = AuxiliaryPoll::Mode;
                 self.auxiliary_due_ns = now_ns;
@@ -186,12 +186,12 @@ impl<const N: usize, B: Bus> Drive<N> for Barrett<N, B> {
         self.port.bus().clock_stall_ns()
     }
 
-    fn rest(&self) -> Rest {
-        Rest::Brakes
+    fn torque_off_behaviour(&self) -> TorqueOffBehaviour {
+        TorqueOffBehaviour::Brakes
     }
 
-    fn reserved(&self) -> Reserved {
-        Reserved {
+    fn reserved(&self) -> ReservedTimes {
+        ReservedTimes {
             states_ns: self.bus_time.positions_ns,
             torques_ns: self.bus_time.torques_ns,
         }
@@ -244,7 +244,7 @@ impl<const N: usize, B: Bus> Drive<N> for Barrett<N, B> {
             Some((SafetyMode::Active, last_reply_ns))
                 if now_ns > last_reply_ns + MODULE_SILENCE_NS =>
             {
-                Some(LossReason::Module)
+                Some(LossReason::SafetyModuleSilent)
             }
             _ => None,
         };
@@ -256,7 +256,7 @@ impl<const N: usize, B: Bus> Drive<N> for Barrett<N, B> {
         }
     }
 
-    /// Pucks have no damping of their own: it is not sent.
+    /// Ignores the damping: pucks add none themselves.
     fn send_torques(&mut self, torque_nm: &Vector<N>, _: &Vector<N>) -> Result<(), LoopError> {
         let torques = self.ready.transmission.puck_torques(torque_nm);
         let torques = torques.unwrap_or([PuckTorque::ZERO; N]);
@@ -275,11 +275,11 @@ impl<const N: usize, B: Bus> Drive<N> for Barrett<N, B> {
         Ok(())
     }
 
-    fn lower(&mut self, how: Lower, _: LossReason) -> Result<(), LoopError> {
+    fn lower(&mut self, how: LoweringMode, _: LossReason) -> Result<(), LoopError> {
         let idle = Value::Wide(i32::from(SafetyMode::Idle.value()));
         self.port
             .send(&set(NodeId::SAFETY, self.ids.module_mode, idle))?;
-        if how == Lower::Forced {
+        if how == LoweringMode::Forced {
             self.port
                 .send(&set(GroupId::ARM, self.ids.motor_mode, Value::Wide(0)))?;
         }
@@ -292,7 +292,7 @@ impl<const N: usize, B: Bus> Drive<N> for Barrett<N, B> {
         let now_ns = self.port.bus().now_ns();
         let fits =
             now_ns + self.bus_time.torques_ns + self.bus_time.auxiliary_poll_ns <= next_period_ns;
-        // While replies are missing, waiting for them takes the time of the polls; an overdue poll is sent anyway.
+        // While replies are missing, the time of the polls is spent waiting for them; a poll that is overdue is sent anyway.
         let overdue = now_ns >= self.auxiliary_due_ns + AUXILIARY_POLL_PERIOD_NS;
         let due = fits && now_ns >= self.auxiliary_due_ns;
         if !due && !overdue && !lowering {
@@ -341,7 +341,7 @@ impl<const N: usize, B: Bus> Drive<N> for Barrett<N, B> {
     }
 }
 
-/// Frames of a period.
+/// Lists the frames of a period.
 fn budget(time: &BusTime) -> Budget {
     let layout = |dlc| FrameLayout::standard(FrameFormat::Classic, dlc);
     let motor_only = time.joints - time.joint_encoders;

@@ -16,24 +16,24 @@ pub enum CanError {
     /// Error of the bus itself.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// A fault on the bus.
+    /// The CAN controller reported a fault on the bus.
     #[error("the bus failed: {0}")]
     BusFault(BusFault),
     /// The plant loop cannot continue.
     #[error(transparent)]
     Loop(#[from] LoopError),
-    /// The rate exceeds the bandwidth of the drives' bus.
+    /// The cycle rate exceeds the bandwidth of the bus, as computed by the plant loop.
     #[error(transparent)]
     Rate(#[from] Box<supple_drive::Overload>),
-    /// The rate exceeds the bus bandwidth.
+    /// The cycle rate exceeds the bandwidth of the bus, as computed before the arm is contacted.
     #[error(transparent)]
     Overload(#[from] Overload),
-    /// Error in the description of the arm.
+    /// The description of the arm has an error.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// An arm that is not a WAM with 4 or 7 joints.
+    /// The arm is not a WAM with 4 or 7 joints.
     #[error(
-        "arm `{arm}` has {found} moving joints, a WAM has 4 or 7 motor pucks: give such an arm, or one with [bus] in its TOML; any other arm can \
+        "arm `{arm}` has {found} moving joints, a WAM has 4 or 7 motor pucks: select a WAM with --arm, or an arm with [bus] in its TOML; any other arm can \
          be simulated, `supple up --plant sim`"
     )]
     Joints {
@@ -42,15 +42,17 @@ pub enum CanError {
         /// Joints found.
         found: usize,
     },
-    /// The description lacks a value that the pucks are checked against.
-    #[error("arm `{arm}`: [motors] {key} is missing: add it, the pucks are checked against it")]
+    /// The description lacks a value that start-up compares with the pucks.
+    #[error(
+        "arm `{arm}`: [motors] {key} is missing: add it to the TOML, start-up compares the pucks with it"
+    )]
     MissingKey {
         /// Name of the arm.
         arm: String,
         /// Key of the TOML.
         key: &'static str,
     },
-    /// A node that does not answer.
+    /// A node does not answer.
     #[error("{what} (node {node}) does not answer: {remedy}")]
     Missing {
         /// Kind of node.
@@ -60,7 +62,7 @@ pub enum CanError {
         /// Remedy.
         remedy: &'static str,
     },
-    /// More motors than joints.
+    /// The bus has more motor pucks than the arm has joints.
     #[error(
         "motor puck {node} answers, but arm `{arm}` has {joints} joints: select the connected arm with --arm"
     )]
@@ -72,7 +74,7 @@ pub enum CanError {
         /// Joints of the arm.
         joints: usize,
     },
-    /// A puck with another role.
+    /// A node has another role than expected.
     #[error(
         "node {node} has role {role:#06x}, expected {expected}: check that the arm is wired as described"
     )]
@@ -84,17 +86,17 @@ pub enum CanError {
         /// Expected role.
         expected: &'static str,
     },
-    /// A firmware whose property ids are not known.
+    /// The firmware of a node is too old: its property ids are not known.
     #[error("node {node}: {source}; update it")]
-    Firmware {
+    FirmwareTooOld {
         /// Number of the node.
         node: u8,
         /// Version found and minimum version.
         source: FirmwareTooOld,
     },
-    /// A firmware that lacks a property.
-    #[error("firmware {version} of node {node} has no property {property}: update it")]
-    Property {
+    /// The firmware of a node lacks a property.
+    #[error("firmware {version} of node {node} has no property {property}: update the firmware")]
+    UnsupportedProperty {
         /// Number of the node.
         node: u8,
         /// Version found.
@@ -102,7 +104,7 @@ pub enum CanError {
         /// Property.
         property: Property,
     },
-    /// Pucks whose firmware has torque or position under different property ids.
+    /// The firmware of two pucks has torque or position under different property ids.
     #[error(
         "node {node} has the {property} under property id {found}, the first motor puck under {expected}: give all motor pucks the \
          same firmware"
@@ -117,7 +119,7 @@ pub enum CanError {
         /// Id of the first motor puck.
         expected: u8,
     },
-    /// A puck that does not wake up.
+    /// A puck does not wake up.
     #[error("motor puck {node} stays at STAT {stat} after the wake-up: switch the arm off and on")]
     NotAwake {
         /// Number of the node.
@@ -125,7 +127,7 @@ pub enum CanError {
         /// Value found.
         stat: i32,
     },
-    /// A setting that was not applied.
+    /// A node did not apply a setting.
     #[error(
         "{property} of node {node} is {found} after it was set to {expected}: switch the arm off and on"
     )]
@@ -139,11 +141,11 @@ pub enum CanError {
         /// Value set.
         expected: i32,
     },
-    /// A puck that contradicts the description.
+    /// A property of a puck differs from the description of the arm.
     #[error(
-        "{property} of motor puck {node} is {found}, the arm's {key} requires {expected}: correct the TOML or the puck"
+        "{property} of motor puck {node} is {found}, the arm's {key} requires {expected}: correct the TOML, or the property of the puck"
     )]
-    Contradiction {
+    DescriptionMismatch {
         /// Property.
         property: Property,
         /// Node.
@@ -155,7 +157,7 @@ pub enum CanError {
         /// Value of the description.
         expected: f64,
     },
-    /// A puck above its temperature limit.
+    /// A puck is above its temperature limit.
     #[error(
         "motor puck {node} is at {found} degrees Celsius, its limit is {limit}: let it cool down"
     )]
@@ -167,31 +169,31 @@ pub enum CanError {
         /// Limit.
         limit: i32,
     },
-    /// Invalid number of encoder counts.
-    #[error("node {node}: {source}")]
-    Counts {
+    /// A puck reports an invalid number of encoder counts per revolution.
+    #[error("motor puck {node}, encoder counts per revolution (CTS): {source}")]
+    InvalidCountsPerRevolution {
         /// Node.
         node: u8,
         /// The error in CTS.
         source: PositionScaleError,
     },
-    /// Invalid torque units.
-    #[error("node {node}: {source}")]
-    Units {
+    /// A puck reports invalid torque units.
+    #[error("motor puck {node}, torque units per newton metre (IPNM): {source}")]
+    InvalidTorqueUnits {
         /// Node.
         node: u8,
         /// The error in IPNM.
         source: TorqueError,
     },
-    /// A home pose outside the range of positions.
+    /// The home pose exceeds the range of the motor positions.
     #[error("home pose: {0}; correct home_rad")]
-    Home(#[from] CountsError),
-    /// Inconsistent limits of the safety module.
+    InvalidHomePose(#[from] CountsError),
+    /// The limits for the safety module are inconsistent.
     #[error("safety limits: {0}")]
-    Limits(#[from] SafetyLimitsError),
-    /// The positions are unknown.
+    InvalidSafetyLimits(#[from] SafetyLimitsError),
+    /// The arm has no position reference, and start-up may not ask the operator.
     #[error(
-        "the safety module's ZERO is {zero}: the arm has lost its positions; put it into its home pose \
+        "the safety module's ZERO is {zero}: the arm has lost its position reference; move it to its home pose \
          {home} rad, and start again with --zero-at-home"
     )]
     NotZeroed {
@@ -200,12 +202,12 @@ pub enum CanError {
         /// Home pose as text.
         home: String,
     },
-    /// The operator cannot be asked for the home pose.
-    #[error("the question for the home pose cannot be written into the folder of the system: {0}")]
-    Question(#[source] std::io::Error),
-    /// The module is in another mode than requested.
+    /// The file that asks the operator to confirm the home pose cannot be written.
+    #[error("the file that asks the operator to confirm the home pose cannot be written: {0}")]
+    HomePoseQuestion(#[source] std::io::Error),
+    /// The safety module is in another mode than requested.
     #[error(
-        "the safety module is in {found:?}, expected {expected:?}: press Shift-Idle at the pendant and start again"
+        "the safety module is in {found:?}, expected {expected:?}: press Shift-Idle on the pendant and start again"
     )]
     Mode {
         /// Found.
@@ -213,9 +215,9 @@ pub enum CanError {
         /// Expected.
         expected: SafetyMode,
     },
-    /// A value that the protocol does not define.
+    /// A property has a value that the protocol does not define.
     #[error("{property} of node {node} is {found}, an unknown value: check the node's firmware")]
-    Value {
+    UnknownPropertyValue {
         /// Property.
         property: Property,
         /// Node.
@@ -232,7 +234,7 @@ pub enum CanError {
 }
 
 impl CanError {
-    /// Exit code, as for the command line: 3 for a wrong arm or description, 4 for an arm that fails a check, 10
+    /// Returns the exit code of the program: 3 for a wrong arm or description, 4 for an arm that fails a check, 10
     /// for the bus, shared memory or the system.
     pub fn code(&self) -> u8 {
         match self {
@@ -241,8 +243,8 @@ impl CanError {
             | CanError::MissingKey { .. }
             | CanError::Overload(_)
             | CanError::Rate(_)
-            | CanError::Home(_)
-            | CanError::Limits(_) => 3,
+            | CanError::InvalidHomePose(_)
+            | CanError::InvalidSafetyLimits(_) => 3,
             CanError::Bus(_)
             | CanError::BusFault(_)
             | CanError::Link(_)

@@ -1,4 +1,4 @@
-//! Blocking property access during start-up, one property at a time.
+//! Blocking access to the properties of nodes during start-up, one property at a time.
 
 use crate::drives::barrett::error::CanError;
 use supple_bus::{Bus, BusFault, Event};
@@ -10,21 +10,21 @@ use supple_puck::{Destination, GroupId, Inbound, NodeId, PropertyId, Value};
 pub const MS: u64 = 1_000_000;
 /// Timeout of a reply; libbarrett found 1 ms too short on fast computers.
 const REPLY_NS: u64 = 5 * MS;
-/// Minimum time between frames that configure a node.
+/// Minimum time after a frame that sets a property \[ns\].
 const SETTING_INTERVAL_NS: u64 = 10 * MS;
 /// Number of requests before a node counts as silent.
 const MAX_ATTEMPTS: u32 = 3;
 
-/// The host's end of the bus during start-up.
+/// The host's access to the bus during start-up.
 pub struct Host<'a, B> {
     /// The bus.
     pub bus: &'a mut B,
-    /// Called repeatedly; `true` ends the start-up.
+    /// Shutdown request: start-up calls it repeatedly and ends if it returns `true`.
     pub stop: &'a dyn Fn() -> bool,
 }
 
 impl<B: Bus> Host<'_, B> {
-    /// Reads a property; `None` if the node does not answer.
+    /// Reads a property; returns `None` if the node does not answer.
     ///
     /// # Errors
     /// If the bus fails.
@@ -43,7 +43,7 @@ impl<B: Bus> Host<'_, B> {
                     {
                         return Ok(Some(reply.value.get()));
                     }
-                    // Other frames are replies to other requests; ignored.
+                    // Other frames are replies to other requests and are ignored.
                     _ => {}
                 }
             }
@@ -100,7 +100,7 @@ impl<B: Bus> Host<'_, B> {
         Ok(positions)
     }
 
-    /// The next frame of another node. Missing acknowledgements are not an error during enumeration.
+    /// Returns the next frame of another node. A missing acknowledgement is no error: it is normal during enumeration.
     fn next(&mut self, until_ns: u64) -> Result<Option<CanFrame>, CanError> {
         loop {
             match self.bus.receive_until(until_ns)? {

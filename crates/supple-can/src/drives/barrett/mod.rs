@@ -19,7 +19,7 @@ pub use error::CanError;
 use crate::backend::DriveBackend;
 use supple_process::Failure;
 
-/// Line of the registry: every arm without another make.
+/// The backend of Barrett's drives; it accepts every arm that no backend before it in the registry accepts.
 pub const BACKEND: DriveBackend = DriveBackend {
     name: "barrett",
     supports: |_| true,

@@ -1,23 +1,23 @@
-//! Force of the force/torque sensor, whose validity is known only from the torque frame that follows.
+//! Receives the force of the force/torque sensor. The sensor sends the status of a force in the torque frame that follows.
 
 use supple_core::nalgebra::Vector3;
 use supple_puck::force_torque::{Quantity, SensorReading};
 
-/// Age after which a reading is discarded \[ns\].
+/// Age after which a force is stale \[ns\].
 const STALE_NS: u64 = 100_000_000;
 
-/// The last valid force, with the force frame that still lacks its status.
+/// Receiver of the sensor's frames: holds the last valid force, and a force whose status has not arrived.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Readings {
-    /// Force whose torque frame has not yet arrived \[N\].
+pub struct ForceReceiver {
+    /// Force whose status has not arrived \[N\].
     pending_n: Option<Vector3<f64>>,
-    /// Last valid force \[N\], and when its torque frame was received \[ns\].
+    /// Last valid force \[N\], and the time at which its torque frame was received \[ns\].
     force_n: Option<(Vector3<f64>, u64)>,
 }
 
-impl Readings {
-    /// Processes a frame. A force becomes valid with the torque frame after it, unless the status in that frame reports
-    /// bad data.
+impl ForceReceiver {
+    /// Processes a frame of the sensor. The torque frame after a force makes the force valid, unless its status reports bad
+    /// data.
     pub fn update(&mut self, reading: &SensorReading, now_ns: u64) {
         match reading.quantity {
             Quantity::Force => self.pending_n = Some(Vector3::from(reading.components())),
@@ -30,7 +30,7 @@ impl Readings {
         }
     }
 
-    /// Force on the tip, in the sensor's axes \[N\], unless it is stale.
+    /// Returns the last valid force on the tip, in the sensor's axes \[N\]; `None` if it is stale.
     pub fn force_n(&self, now_ns: u64) -> Option<Vector3<f64>> {
         let (force_n, received_ns) = self.force_n?;
         (now_ns <= received_ns + STALE_NS).then_some(force_n)

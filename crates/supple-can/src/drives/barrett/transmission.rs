@@ -36,8 +36,7 @@ impl<const N: usize> Transmission<N> {
         })
     }
 
-    /// Joint angles \[rad\] from motor counts. A joint has no angle if the reply of a motor that moves it is
-    /// missing.
+    /// Computes the joint angles \[rad\] from motor counts; `None` for a joint if a motor that moves it did not reply.
     pub fn joint_rad(&self, counts: &[Option<Counts>; N]) -> [Option<f64>; N] {
         core::array::from_fn(|joint| {
             let mut angle_rad = 0.0;
@@ -51,10 +50,10 @@ impl<const N: usize> Transmission<N> {
         })
     }
 
-    /// Encoder counts of the motors at these joint angles \[rad\].
+    /// Computes the encoder counts of the motors at these joint angles \[rad\].
     ///
     /// # Errors
-    /// A motor angle that is not finite or exceeds the range of the counts.
+    /// [`CountsError`] for a motor angle that is not finite or exceeds the range of the counts.
     pub fn counts(&self, joint_rad: &Vector<N>) -> Result<[Counts; N], CountsError> {
         let motor_rad = self.motor_from_joint * joint_rad;
         let mut counts = [Counts::new(0)?; N];
@@ -64,10 +63,10 @@ impl<const N: usize> Transmission<N> {
         Ok(counts)
     }
 
-    /// Motor torques in the pucks' integer unit, rounded to the nearest integer, from joint torques \[N m\].
+    /// Computes motor torques in the pucks' integer unit, rounded to the nearest integer, from joint torques \[N m\].
     ///
     /// # Errors
-    /// A torque that is not finite.
+    /// [`TorqueError`] for a torque that is not finite.
     pub fn puck_torques(&self, joint_nm: &Vector<N>) -> Result<[PuckTorque; N], TorqueError> {
         let motor_nm = self.joint_from_motor.transpose() * joint_nm;
         let mut torques = [PuckTorque::ZERO; N];

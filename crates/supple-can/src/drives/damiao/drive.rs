@@ -1,61 +1,62 @@
-//! Damiao motors as drives: the torque is the question. A cycle opens with the torques of the previous one, whose
-//! replies carry the state, so that the state is fresh when the controller gets it and its torque acts one period later.
+//! Drives of an arm with Damiao motors: the torque command is also the request for the motor state. A cycle begins with the
+//! torque commands that the controller computed in the previous cycle; the replies carry the state. The state is therefore
+//! fresh when the controller receives it, and a torque acts one period after it was computed.
 //!
 //! ```text
 //! disabled --(gravity hold requests torque)--> enable --> starting --(all enabled)--> enabled
 //! enabled or starting --(lowered, or a motor that cannot be enabled)--> disabling --(all disabled)--> disabled
 //! ```
 //!
-//! In the cycle that enables the motors each of them gets the enable frame instead of a command; from the next cycle on
-//! the torque is gravity compensation. Nothing here clears an error, sets a zero or writes a register.
+//! In the cycle that enables the motors, each motor receives the enable frame instead of a command; from the next cycle
+//! on, the torque is gravity compensation. This drive never clears an error, sets a zero position or writes a register.
 
-use super::motor::{Motor, Running};
+use super::motor::{Motor, MotorInCycle};
 use supple_bus::Bus;
 use supple_can_frame::timing::FrameLayout;
 use supple_can_frame::{BitRates, FrameFormat};
 use supple_core::Vector;
 use supple_core::controller::Mode;
-use supple_damiao::{Frame, Special, Status};
+use supple_damiao::{Frame, SpecialCommand, Status};
 use supple_drive::{
     Budget, BusPort, Command, Drive, DriveCounters, DriveState, Drives, LoopError, LossReason,
-    Lower, Reading, Received, Reserved, Rest,
+    LoweringMode, Reading, Received, ReservedTimes, TorqueOffBehaviour,
 };
 
-/// Cycles within which all motors must be enabled.
+/// Number of cycles within which all motors must confirm that they are enabled.
 const STARTING_CYCLES: u32 = 20;
-/// Cycles after which the enable frame is repeated.
+/// Number of cycles after which the enable frame is repeated.
 const ENABLE_AGAIN_CYCLES: u32 = 5;
-/// Bytes of every frame.
+/// Payload of every frame \[bytes\].
 const BYTES: u8 = 8;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Power {
     Disabled,
-    /// This many cycles since the first command to the motors.
+    /// The motors are being enabled, for this number of cycles.
     Starting(u32),
     Enabled,
     Disabling,
 }
 
-/// Motors of an arm on their bus, after start-up.
+/// The Damiao motors of an arm, with their bus, after start-up.
 pub struct Damiao<const N: usize, B> {
     port: BusPort<B>,
     format: FrameFormat,
-    motors: [Running; N],
+    motors: [MotorInCycle; N],
     power: Power,
     torque_nm: Vector<N>,
     damping_nm_s_per_rad: Vector<N>,
-    /// Disabled after a loss; until the controller requests no torque.
+    /// Whether the motors remain disabled after a loss, until the controller requests no torque.
     latched: bool,
 }
 
 impl<const N: usize, B: Bus> Damiao<N, B> {
-    /// Disabled motors, in cycles of `period_s`.
+    /// Creates the drives of an arm whose motors are disabled and whose cycles take `period_s`.
     pub fn new(bus: B, rates: BitRates, motors: [Motor; N], period_s: f64) -> Damiao<N, B> {
         Damiao {
             port: BusPort::new(bus, rates),
             format: rates.fastest_format(),
-            motors: motors.map(|motor| Running::new(motor, period_s)),
+            motors: motors.map(|motor| MotorInCycle::new(motor, period_s)),
             power: Power::Disabled,
             torque_nm: Vector::zeros(),
             damping_nm_s_per_rad: Vector::zeros(),
@@ -63,7 +64,7 @@ impl<const N: usize, B: Bus> Damiao<N, B> {
         }
     }
 
-    /// Keeps the motors disabled until the controller has wanted no torque, as after a loss.
+    /// Keeps the motors disabled until the controller requests no torque, as after a loss.
     pub fn latch(&mut self) {
         self.latched = true;
     }
@@ -78,7 +79,7 @@ impl<const N: usize, B: Bus> Damiao<N, B> {
         self.port.bus_mut()
     }
 
-    /// Gives the bus back.
+    /// Returns the bus.
     pub fn into_bus(self) -> B {
         self.port.into_bus()
     }
@@ -113,40 +114,40 @@ impl<const N: usize, B: Bus> Damiao<N, B> {
             .all(|motor| motor.status() == Some(status))
     }
 
-    /// Whether any reply of this cycle is from an enabled motor.
+    /// Whether an enabled motor replied in this cycle.
     fn any_enabled(&self) -> bool {
-        let mut replies = self.motors.iter().filter_map(Running::feedback);
+        let mut replies = self.motors.iter().filter_map(MotorInCycle::feedback);
         replies.any(|feedback| feedback.status == Status::Enabled)
     }
 
-    /// Judges the replies of this cycle.
-    fn judge(&mut self) {
+    /// Checks the replies of this cycle: updates the power state and the faults of the motors.
+    fn check_replies(&mut self) {
         match self.power {
-            // A motor that missed its disable frame is sent another.
+            // A motor that missed its disable frame receives another one.
             Power::Disabled if self.any_enabled() => self.power = Power::Disabling,
             Power::Disabled => {}
             Power::Starting(_) if self.all(Status::Enabled) => {
                 self.power = Power::Enabled;
             }
             Power::Starting(cycles) if cycles > STARTING_CYCLES => {
-                let stuck = |motor: &&mut Running| motor.status() != Some(Status::Enabled);
+                let stuck = |motor: &&mut MotorInCycle| motor.status() != Some(Status::Enabled);
                 self.motors
                     .iter_mut()
                     .filter(stuck)
-                    .for_each(Running::refuse);
+                    .for_each(MotorInCycle::record_enable_fault);
                 self.latched = true;
                 self.power = Power::Disabling;
             }
             Power::Starting(_) => {}
-            Power::Enabled => self.motors.iter_mut().for_each(Running::judge),
-            // A motor that does not confirm is sent another in every cycle, and its watchdog ends its torque.
+            Power::Enabled => self.motors.iter_mut().for_each(MotorInCycle::check_replies),
+            // A motor that does not confirm receives a disable frame in every cycle; its watchdog ends its torque.
             Power::Disabling if !self.any_enabled() => self.power = Power::Disabled,
             Power::Disabling => {}
         }
     }
 }
 
-/// Frames of a period: a command and a reply of each motor.
+/// Lists the frames of a period: a command and a reply of each motor.
 pub fn budget(rates: BitRates, joints: usize) -> Budget {
     let layout = FrameLayout::standard(rates.fastest_format(), BYTES);
     Budget::new(rates, joints)
@@ -167,13 +168,13 @@ impl<const N: usize, B: Bus> Drive<N> for Damiao<N, B> {
         self.port.bus().clock_stall_ns()
     }
 
-    fn rest(&self) -> Rest {
-        Rest::Falls
+    fn torque_off_behaviour(&self) -> TorqueOffBehaviour {
+        TorqueOffBehaviour::Falls
     }
 
-    /// The torques wait for the next cycle.
-    fn reserved(&self) -> Reserved {
-        Reserved {
+    /// Reserves no time for torques: they are sent at the start of the next cycle.
+    fn reserved(&self) -> ReservedTimes {
+        ReservedTimes {
             states_ns: self.budget().min_period_ns(),
             torques_ns: 0,
         }
@@ -186,19 +187,19 @@ impl<const N: usize, B: Bus> Drive<N> for Damiao<N, B> {
     fn request(&mut self) -> Result<(), LoopError> {
         let special = match &mut self.power {
             Power::Disabled | Power::Enabled => None,
-            Power::Disabling => Some(Special::Disable),
+            Power::Disabling => Some(SpecialCommand::Disable),
             Power::Starting(cycles) => {
                 *cycles += 1;
-                (*cycles % ENABLE_AGAIN_CYCLES == 1).then_some(Special::Enable)
+                (*cycles % ENABLE_AGAIN_CYCLES == 1).then_some(SpecialCommand::Enable)
             }
         };
         let disabled = self.power == Power::Disabled;
         for (joint, motor) in self.motors.iter_mut().enumerate() {
             let enabled = motor.status() == Some(Status::Enabled);
             let frame = match special {
-                Some(Special::Enable) if enabled => None,
-                // It has not confirmed that it is disabled: no command may feed its watchdog.
-                None if disabled && enabled => Some(Special::Disable),
+                Some(SpecialCommand::Enable) if enabled => None,
+                // The motor has not confirmed that it is disabled: a command would reset its watchdog.
+                None if disabled && enabled => Some(SpecialCommand::Disable),
                 special => special,
             };
             let frame = match frame {
@@ -229,7 +230,7 @@ impl<const N: usize, B: Bus> Drive<N> for Damiao<N, B> {
                 missing |= u8::from(confirmed) << index;
             }
         }
-        self.judge();
+        self.check_replies();
         Ok(missing)
     }
 
@@ -243,7 +244,7 @@ impl<const N: usize, B: Bus> Drive<N> for Damiao<N, B> {
     fn state(&self) -> DriveState {
         let drives = match self.power {
             Power::Enabled => Drives::Active,
-            // A motor that still has torque is lowered further.
+            // The drives stay active while a motor still has torque, so that the loop continues to end it.
             Power::Disabling => Drives::Active,
             Power::Starting(_) => Drives::Idle,
             Power::Disabled if self.motors_replied() => Drives::Idle,
@@ -266,7 +267,7 @@ impl<const N: usize, B: Bus> Drive<N> for Damiao<N, B> {
         let holds =
             |command: &Command<N>| command.mode == Some(Mode::GravityHold) && command.wants_torque;
         if matches!(self.power, Power::Starting(_)) && !(allowed && command.is_none_or(holds)) {
-            // Nobody wants the torque of motors that are just being enabled.
+            // The controller requests no torque: motors that are being enabled are disabled.
             self.power = Power::Disabling;
             return false;
         }
@@ -279,7 +280,7 @@ impl<const N: usize, B: Bus> Drive<N> for Damiao<N, B> {
         if !(allowed && holding && idle && !self.latched && self.missing_replies() == 0) {
             return false;
         }
-        self.motors.iter_mut().for_each(Running::begin);
+        self.motors.iter_mut().for_each(MotorInCycle::begin);
         self.power = Power::Starting(0);
         true
     }
@@ -294,7 +295,7 @@ impl<const N: usize, B: Bus> Drive<N> for Damiao<N, B> {
         Ok(())
     }
 
-    fn lower(&mut self, _: Lower, reason: LossReason) -> Result<(), LoopError> {
+    fn lower(&mut self, _: LoweringMode, reason: LossReason) -> Result<(), LoopError> {
         self.latched |= reason != LossReason::TorqueNotWanted;
         self.power = Power::Disabling;
         Ok(())

@@ -10,11 +10,11 @@ use supple_model::ModelError;
 /// Errors of start-up and operation. Each message gives the value found, the value expected, and the remedy.
 #[derive(Debug, thiserror::Error)]
 pub enum DamiaoError {
-    /// Error in the description of the arm.
+    /// The description of the arm has an error.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// The description lacks its motors.
-    #[error("arm `{arm}`: [bus] must list one Damiao motor per joint")]
+    /// The description does not list the motors.
+    #[error("arm `{arm}`: [bus] must list one Damiao motor per joint: complete it in the TOML")]
     NoMotors {
         /// Name of the arm.
         arm: String,
@@ -22,10 +22,10 @@ pub enum DamiaoError {
     /// Error of the bus itself.
     #[error(transparent)]
     Bus(#[from] BusError),
-    /// A fault on the bus during start-up.
+    /// The CAN controller reported a fault during start-up.
     #[error("the bus failed: {0}")]
     BusFault(BusFault),
-    /// A motor that does not fit.
+    /// A motor does not match the description.
     #[error("joint {joint}: {refusal}")]
     Refused {
         /// Name of the joint.
@@ -33,7 +33,7 @@ pub enum DamiaoError {
         /// Register, found, expected, remedy.
         refusal: Refusal,
     },
-    /// A start position that no whole number of turns explains.
+    /// No whole number of turns brings the start position within the limits of the joint.
     #[error("joint {joint}: {source}")]
     Position {
         /// Name of the joint.
@@ -41,9 +41,9 @@ pub enum DamiaoError {
         /// The position.
         source: PositionError,
     },
-    /// The arm's motors speak CAN FD, the bus does not carry it.
+    /// The arm's motors use CAN FD, but the bus carries classic frames only.
     #[error(
-        "arm `{arm}` has motors on CAN FD ([bus] format), and the bus carries classic frames only: set the interface to \
+        "arm `{arm}` has motors on CAN FD ([bus] format), but the bus carries classic frames only: set the interface to \
          CAN FD (ip link set can0 type can bitrate 1000000 dbitrate 5000000 fd on), or motors and TOML to classic CAN"
     )]
     NoFd {
@@ -56,7 +56,7 @@ pub enum DamiaoError {
     /// The plant loop cannot continue.
     #[error(transparent)]
     Loop(#[from] LoopError),
-    /// Shared memory.
+    /// Shared memory failed.
     #[error("shared memory: {0}")]
     Ipc(#[from] IpcError),
     /// A shutdown was requested.
@@ -65,7 +65,7 @@ pub enum DamiaoError {
 }
 
 impl DamiaoError {
-    /// Exit code, as for the command line: 3 for a wrong arm or description, 4 for an arm that fails a check, 10 for
+    /// Returns the exit code of the program: 3 for a wrong arm or description, 4 for an arm that fails a check, 10 for
     /// the bus, shared memory or the system.
     pub fn code(&self) -> u8 {
         match self {

@@ -1,4 +1,4 @@
-//! Questions to one motor at a time during start-up, with tries and deadlines.
+//! Requests to one motor at a time during start-up, with retries and timeouts.
 
 use super::error::DamiaoError;
 use supple_bus::{Bus, BusFault, Event};
@@ -7,24 +7,24 @@ use supple_damiao::feedback::Feedback;
 use supple_damiao::frame::Frame;
 use supple_damiao::refusal::Problem;
 use supple_damiao::register::{self, Operation, Register, RegisterReply, Value};
-use supple_damiao::special::Special;
+use supple_damiao::special::SpecialCommand;
 
 /// One millisecond \[ns\].
 pub const MS: u64 = 1_000_000;
-/// Tries of a question.
-const TRIES: u32 = 3;
-/// Deadline of a reply \[ns\].
-const REPLY_NS: u64 = 5 * MS;
-/// Pause before a feedback request or a special frame is sent again \[ns\]; requests of registers are repeated at once.
+/// Maximum number of times that a request is sent.
+const MAX_ATTEMPTS: u32 = 3;
+/// Timeout of a reply \[ns\].
+const REPLY_TIMEOUT_NS: u64 = 5 * MS;
+/// Pause before a feedback request or a special frame is repeated \[ns\]; a register request is repeated at once.
 const RETRY_NS: u64 = 100 * MS;
 
-/// The host's end of the bus during start-up.
+/// The host's access to the bus during start-up.
 pub struct Host<'a, B> {
     /// The bus.
     pub bus: &'a mut B,
     /// Format of the frames.
     pub format: FrameFormat,
-    /// Called after each pause; `true` ends the start-up.
+    /// Shutdown request: start-up calls it after each pause and ends if it returns `true`.
     pub stop: &'a dyn Fn() -> bool,
 }
 
@@ -35,7 +35,7 @@ struct ReceivedFrame {
 }
 
 impl<B: Bus> Host<'_, B> {
-    /// Receives and drops all frames for this time.
+    /// Receives and discards all frames for this time.
     ///
     /// # Errors
     /// If the bus fails, or a shutdown is requested.
@@ -48,56 +48,56 @@ impl<B: Bus> Host<'_, B> {
         Ok(())
     }
 
-    /// The feedback of a motor, without a command.
+    /// Requests the feedback of a motor without a command.
     ///
     /// # Errors
-    /// Outer: the bus fails, or a shutdown is requested. Inner: the [`Problem`] of a motor that does not answer, or not as
-    /// expected.
+    /// The outer error means that the bus failed or a shutdown was requested. The inner error is the [`Problem`] of a motor
+    /// that does not answer, or not as expected.
     pub fn feedback(
         &mut self,
         id: u8,
         reply_id: u16,
     ) -> Result<Result<Feedback, Problem>, DamiaoError> {
-        self.ask(id, reply_id, &register::ask_feedback(id))
+        self.request_feedback(id, reply_id, &register::request_feedback(id))
     }
 
-    /// Sends a special frame (enable, disable, clear an error) and returns the feedback to it.
+    /// Sends a special frame (enable, disable, clear an error) and returns the feedback in the motor's reply.
     ///
     /// # Errors
-    /// As [`Host::feedback`].
+    /// The same as those of [`Host::feedback`].
     pub fn special(
         &mut self,
         id: u8,
         reply_id: u16,
-        special: Special,
+        special: SpecialCommand,
     ) -> Result<Result<Feedback, Problem>, DamiaoError> {
-        self.ask(id, reply_id, &special.emit(id))
+        self.request_feedback(id, reply_id, &special.emit(id))
     }
 
-    fn ask(
+    fn request_feedback(
         &mut self,
         id: u8,
         reply_id: u16,
-        question: &Frame,
+        request: &Frame,
     ) -> Result<Result<Feedback, Problem>, DamiaoError> {
         let mut other = None;
-        for attempt in 0..TRIES {
+        for attempt in 0..MAX_ATTEMPTS {
             if attempt > 0 {
                 self.discard(RETRY_NS)?;
             }
-            self.bus.send(&question.on_bus(self.format))?;
-            let until_ns = self.bus.now_ns() + REPLY_NS;
+            self.bus.send(&request.on_bus(self.format))?;
+            let until_ns = self.bus.now_ns() + REPLY_TIMEOUT_NS;
             let mut found: Option<Feedback> = None;
             while let Some(received) = self.next(until_ns)? {
                 if received.frame.id() == reply_id
                     && received.fd != matches!(self.format, FrameFormat::Fd { .. })
                 {
-                    return Ok(Err(Problem::Format {
+                    return Ok(Err(Problem::FormatMismatch {
                         found_fd: received.fd,
                     }));
                 }
                 if received.frame.id() != reply_id {
-                    other = Some(Problem::ReplyId {
+                    other = Some(Problem::ReplyIdMismatch {
                         found: received.frame.id(),
                         expected: reply_id,
                     });
@@ -106,7 +106,7 @@ impl<B: Bus> Host<'_, B> {
                 match Feedback::of_motor(&received.frame, id) {
                     _ if found.is_some() => return Ok(Err(Problem::TwoAnswers)),
                     Ok(feedback) => found = Some(feedback),
-                    Err(error) => return Ok(Err(Problem::Reply(error))),
+                    Err(error) => return Ok(Err(Problem::ForeignFeedback(error))),
                 }
             }
             if let Some(feedback) = found {
@@ -116,7 +116,7 @@ impl<B: Bus> Host<'_, B> {
         Ok(Err(other.unwrap_or(Problem::Silent)))
     }
 
-    /// Reads a register; `None` if it does not answer.
+    /// Reads a register; returns `None` if the motor does not answer.
     ///
     /// # Errors
     /// If the bus fails.
@@ -126,12 +126,12 @@ impl<B: Bus> Host<'_, B> {
         reply_id: u16,
         of: Register,
     ) -> Result<Option<[u8; 4]>, DamiaoError> {
-        let question = register::read(id, of);
-        self.register(id, reply_id, &question, Operation::Read, of)
+        let request = register::read(id, of);
+        self.access_register(id, reply_id, &request, Operation::Read, of)
     }
 
-    /// Writes a register in RAM; `None` if the motor does not answer, or the register cannot be written. The caller reads
-    /// it back.
+    /// Writes a register in RAM; returns `None` if the motor does not answer or the register cannot be written. The caller
+    /// reads the register back.
     ///
     /// # Errors
     /// If the bus fails.
@@ -142,23 +142,23 @@ impl<B: Bus> Host<'_, B> {
         of: Register,
         value: u32,
     ) -> Result<Option<[u8; 4]>, DamiaoError> {
-        let Ok(question) = register::write(id, of, Value::Integer(value)) else {
+        let Ok(request) = register::write(id, of, Value::Integer(value)) else {
             return Ok(None);
         };
-        self.register(id, reply_id, &question, Operation::Write, of)
+        self.access_register(id, reply_id, &request, Operation::Write, of)
     }
 
-    fn register(
+    fn access_register(
         &mut self,
         id: u8,
         reply_id: u16,
-        question: &Frame,
+        request: &Frame,
         operation: Operation,
         of: Register,
     ) -> Result<Option<[u8; 4]>, DamiaoError> {
-        for _ in 0..TRIES {
-            self.bus.send(&question.on_bus(self.format))?;
-            let until_ns = self.bus.now_ns() + REPLY_NS;
+        for _ in 0..MAX_ATTEMPTS {
+            self.bus.send(&request.on_bus(self.format))?;
+            let until_ns = self.bus.now_ns() + REPLY_TIMEOUT_NS;
             while let Some(received) = self.next(until_ns)? {
                 let reply = RegisterReply::parse(&received.frame, id, operation, of);
                 if let Some(reply) = reply.filter(|_| received.frame.id() == reply_id) {
@@ -169,7 +169,7 @@ impl<B: Bus> Host<'_, B> {
         Ok(None)
     }
 
-    /// The next frame of another node.
+    /// Returns the next frame of another node.
     fn next(&mut self, until_ns: u64) -> Result<Option<ReceivedFrame>, DamiaoError> {
         loop {
             match self.bus.receive_until(until_ns)? {

@@ -1,7 +1,7 @@
 //! Damiao joint motors on CAN or CAN FD: no safety module, no brakes. The arm falls when they are disabled.
 //!
-//! `supple-damiao` is the codec, with what a start-up compares and what a cycle watches; [`start_up`] asks every motor
-//! and refuses one that does not fit, [`Damiao`] is the drive.
+//! `supple-damiao` has the codec, the checks of start-up and the monitoring in a cycle. [`start_up`] reads the registers of
+//! every motor and refuses a motor that does not match the description; [`Damiao`] is the drive.
 
 mod drive;
 mod error;
@@ -20,7 +20,7 @@ use crate::backend::DriveBackend;
 use supple_model::BusKind;
 use supple_process::Failure;
 
-/// Line of the registry.
+/// The backend of Damiao motors.
 pub const BACKEND: DriveBackend = DriveBackend {
     name: "damiao",
     supports: |description| {

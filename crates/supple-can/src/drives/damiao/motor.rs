@@ -1,60 +1,61 @@
-//! One motor in the cycle: its command, its feedback, its faults.
+//! State of one motor in the cycle: command, feedback and faults.
 
 use supple_can_frame::{CanFrame, FrameFormat};
 use supple_damiao::feedback::Feedback;
 use supple_damiao::guard::{MotorFault as Found, MotorGuard};
 use supple_damiao::mit::{KD, MitCodes};
 use supple_damiao::position::JointAngle;
-use supple_damiao::temperature::Thermal;
-use supple_damiao::{Ranges, Special, Status, TorqueShaper};
+use supple_damiao::temperature::TemperatureLimits;
+use supple_damiao::{Ranges, SpecialCommand, Status, TorqueShaper};
 use supple_drive::MotorFault;
 
 /// A motor that start-up has accepted.
 #[derive(Clone, Copy, Debug)]
 pub struct Motor {
-    /// Id that it listens to.
+    /// Id of the frames to the motor.
     pub id: u8,
-    /// Id of its replies.
+    /// Id of the motor's replies.
     pub reply_id: u16,
-    /// Ranges that it reported.
+    /// Ranges of position, velocity and torque that the motor reported.
     pub ranges: Ranges,
-    /// Sign and offset of its joint, with whole turns.
+    /// Sign and offset between motor and joint angle, with the number of whole turns.
     pub angle: JointAngle,
-    /// Its torque over the commanded one.
+    /// Ratio of the motor's torque to the commanded torque.
     pub torque_scale: f64,
-    /// Greatest torque at its joint \[N m\].
+    /// Maximum torque at the joint \[N m\].
     pub torque_limit_nm: f64,
-    /// Temperatures.
-    pub thermal: Thermal,
+    /// Temperature limits.
+    pub thermal: TemperatureLimits,
 }
 
 /// A motor with its state in the cycle.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Running {
+pub(super) struct MotorInCycle {
     motor: Motor,
     period_s: f64,
     shaper: TorqueShaper,
     guard: MotorGuard,
-    /// Feedback of this cycle, and the number of replies in it.
+    /// Feedback of this cycle.
     feedback: Option<Feedback>,
-    answers: u32,
-    /// The last cycle had more than one answer: a late one may explain the first such cycle.
-    many_answers: bool,
+    /// Number of replies in this cycle.
+    replies: u32,
+    /// Whether the previous cycle had more than one reply; the first such cycle may be due to a late reply.
+    had_many_replies: bool,
     last_status: Option<Status>,
     fault: Option<MotorFault>,
     sent: Option<CanFrame>,
 }
 
-impl Running {
-    pub(super) fn new(motor: Motor, period_s: f64) -> Running {
-        Running {
+impl MotorInCycle {
+    pub(super) fn new(motor: Motor, period_s: f64) -> MotorInCycle {
+        MotorInCycle {
             guard: MotorGuard::new(motor.id, motor.ranges, motor.thermal, period_s),
             motor,
             period_s,
             shaper: TorqueShaper::new(),
             feedback: None,
-            answers: 0,
-            many_answers: false,
+            replies: 0,
+            had_many_replies: false,
             last_status: None,
             fault: None,
             sent: None,
@@ -82,7 +83,7 @@ impl Running {
         self.sent.as_ref()
     }
 
-    /// Angle of the joint in this cycle \[rad\]; none where it is known to be wrong.
+    /// Returns the angle of the joint in this cycle \[rad\]; `None` without a reply, or if the angle is known to be wrong.
     pub(super) fn joint_rad(&self) -> Option<f64> {
         if matches!(
             self.fault,
@@ -95,28 +96,28 @@ impl Running {
         Some(self.motor.angle.joint_rad(motor_rad))
     }
 
-    /// Begins a period in which the motor is meant to be enabled: earlier faults are forgotten.
+    /// Clears the faults and the command state before the motor is enabled.
     pub(super) fn begin(&mut self) {
-        *self = Running {
+        *self = MotorInCycle {
             last_status: self.last_status,
-            ..Running::new(self.motor, self.period_s)
+            ..MotorInCycle::new(self.motor, self.period_s)
         };
     }
 
     fn prepare(&mut self, frame: CanFrame) -> CanFrame {
         self.feedback = None;
-        self.answers = 0;
+        self.replies = 0;
         self.sent = Some(frame);
         frame
     }
 
-    /// A special frame that opens the cycle.
-    pub(super) fn special(&mut self, special: Special, format: FrameFormat) -> CanFrame {
+    /// Returns a special frame that begins the cycle.
+    pub(super) fn special(&mut self, special: SpecialCommand, format: FrameFormat) -> CanFrame {
         self.prepare(special.emit(self.motor.id).on_bus(format))
     }
 
-    /// The command that opens the cycle: a joint torque \[N m\] and the motor's own damping \[N m s/rad\]. Its own
-    /// stiffness is always zero.
+    /// Returns the command that begins the cycle: a joint torque \[N m\] and the damping that the motor adds itself
+    /// \[N m s/rad\]. The stiffness of the motor is always zero.
     pub(super) fn command(
         &mut self,
         joint_nm: f64,
@@ -130,7 +131,7 @@ impl Running {
         let joint_nm = joint_nm.clamp(-limit_nm, limit_nm);
         let motor_nm = motor.angle.signed(joint_nm) / motor.torque_scale;
         let ranges = &motor.ranges;
-        // A torque that is not a number is none.
+        // A torque that is not a number becomes zero.
         let torque = self.shaper.encode(motor_nm, ranges).unwrap_or_else(|_| {
             let zero = TorqueShaper::new().encode(0.0, ranges);
             zero.unwrap_or(0x800)
@@ -146,51 +147,51 @@ impl Running {
         self.prepare(frame)
     }
 
-    /// Takes a frame with this motor's reply id.
+    /// Processes a frame with this motor's reply id.
     pub(super) fn handle(&mut self, frame: &supple_damiao::Frame) {
         if let Ok(feedback) = Feedback::parse(frame) {
             self.feedback = Some(feedback);
             self.last_status = Some(feedback.status);
-            self.answers += 1;
+            self.replies += 1;
         }
     }
 
-    /// Judges a cycle in which the motor was meant to be enabled.
-    pub(super) fn judge(&mut self) {
-        let many = self.answers > 1;
-        // The reply to the previous cycle may have come late; twice in a row two motors answer.
-        let answers = if many && !self.many_answers {
+    /// Checks the replies of a cycle in which the motor should be enabled, and records a fault.
+    pub(super) fn check_replies(&mut self) {
+        let many = self.replies > 1;
+        // The reply to the previous cycle may be late; two replies in two cycles mean that two motors have this id.
+        let replies = if many && !self.had_many_replies {
             1
         } else {
-            self.answers
+            self.replies
         };
-        self.many_answers = many;
-        match self.guard.cycle(self.feedback.as_ref(), answers) {
-            // A silent motor is counted by the plant loop.
+        self.had_many_replies = many;
+        match self.guard.cycle(self.feedback.as_ref(), replies) {
+            // The plant loop counts missing replies.
             Ok(()) | Err(Found::Silent { .. }) => {}
-            Err(found) => self.fault = Some(named(&found)),
+            Err(found) => self.fault = Some(drive_fault(&found)),
         }
     }
 
-    /// Notes a motor that cannot be enabled.
-    pub(super) fn refuse(&mut self) {
+    /// Records the fault of a motor that cannot be enabled.
+    pub(super) fn record_enable_fault(&mut self) {
         let status = self.last_status.unwrap_or(Status::Disabled);
-        self.fault = Some(of_status(status));
+        self.fault = Some(fault_of_status(status));
     }
 }
 
-fn named(found: &Found) -> MotorFault {
+fn drive_fault(found: &Found) -> MotorFault {
     match *found {
-        Found::Error(status) => of_status(status),
+        Found::Error(status) => fault_of_status(status),
         Found::Disabled | Found::Silent { .. } => MotorFault::Disabled,
         Found::Hot { .. } => MotorFault::Hot,
-        // No register is read in the cycle: a changed range shows as a jump.
+        // The cycle reads no register: a changed range appears as a position jump.
         Found::PositionJump { .. } | Found::RegisterChanged { .. } => MotorFault::PositionJump,
         Found::ForeignFeedback { .. } | Found::TwoAnswers => MotorFault::TwoMotors,
     }
 }
 
-fn of_status(status: Status) -> MotorFault {
+fn fault_of_status(status: Status) -> MotorFault {
     match status {
         Status::Disabled | Status::Enabled => MotorFault::Disabled,
         Status::OverVoltage => MotorFault::OverVoltage,

@@ -1,31 +1,33 @@
-//! Start-up: the registers of every motor are read, compared with the arm's file and set, before any motor is enabled.
+//! Start-up of Damiao motors: reads the registers of every motor, compares them with the arm's TOML and sets some of them,
+//! before any motor is enabled.
 //!
 //! ```text
-//! feedback of each motor -> registers -> compared -> mode and watchdog set in RAM and read back -> turns unwrapped
+//! read feedback of each motor -> read registers -> compare -> set mode and watchdog in RAM, read back -> unwrap turns
 //! ```
 //!
-//! Nothing is stored in flash and no zero is set. A motor whose watchdog has tripped reports lost communication until the error is
-//! cleared. Start-up, also that after a loss of the arm, clears this error and no other; the motor stays disabled.
+//! Start-up stores nothing in flash and sets no zero position. A motor whose watchdog has tripped reports lost communication
+//! until the error is cleared. Start-up clears this error and no other, also when it is repeated after the arm was lost; the
+//! motor stays disabled.
 
 use super::error::DamiaoError;
 use super::host::{Host, MS};
 use super::motor::Motor;
 use supple_bus::Bus;
 use supple_can_frame::{BitRates, FrameFormat};
-use supple_damiao::inspection::{Expectation, MIT_MODE, Readings, TO_READ};
+use supple_damiao::inspection::{Expectation, MIT_MODE, RegisterReadings, TO_READ};
 use supple_damiao::position::JointAngle;
 use supple_damiao::refusal::Problem;
 use supple_damiao::register::Register;
-use supple_damiao::temperature::Thermal;
-use supple_damiao::{Feedback, Special, Status};
+use supple_damiao::temperature::TemperatureLimits;
+use supple_damiao::{Feedback, SpecialCommand, Status};
 use supple_model::{BusDescription, BusFormat, BusMotor, Description};
 
-/// Silence before the first question: replies to an earlier host have passed \[ns\].
+/// Time before the first request in which replies to an earlier host are discarded \[ns\].
 const QUIET_NS: u64 = 5 * MS;
-/// Angle beyond a joint's limits that is allowed at the start, where the joint rests on its hard stop \[rad\].
+/// Maximum angle by which a joint may exceed its limits at start-up, because it may rest on its hard stop \[rad\].
 const SLACK_RAD: f64 = 0.1;
 
-/// Bit rates of an arm's bus.
+/// Returns the bit rates of an arm's bus.
 pub fn rates(bus: &BusDescription) -> BitRates {
     BitRates {
         nominal_bit_per_s: bus.bit_rate,
@@ -34,7 +36,7 @@ pub fn rates(bus: &BusDescription) -> BitRates {
 }
 
 /// Reads and checks the registers of every motor, writes control mode and watchdog timeout to RAM, and returns the motors. No
-/// motor is enabled; one that is enabled is refused.
+/// motor is enabled; a motor that is already enabled is refused.
 ///
 /// # Errors
 /// [`DamiaoError`]; [`DamiaoError::Refused`] has register, value found, value expected and remedy.
@@ -55,7 +57,7 @@ pub fn start_up<const N: usize, B: Bus>(
             arm: description.name().to_owned(),
         });
     }
-    let thermal = Thermal::new(
+    let thermal = TemperatureLimits::new(
         bus_description.warning_celsius,
         bus_description.derating_celsius,
         bus_description.fault_celsius,
@@ -71,12 +73,12 @@ pub fn start_up<const N: usize, B: Bus>(
             refusal: expectation.refuse(problem),
         };
         let feedback = feedback_of_disabled(&mut host, &expectation)?.map_err(refused_for)?;
-        let mut readings = Readings::new();
+        let mut readings = RegisterReadings::new();
         for register in TO_READ {
             let bytes = host.read(expectation.id, expectation.reply_id, register)?;
-            readings.note(
+            readings.insert(
                 register,
-                bytes.ok_or_else(|| refused_for(Problem::NotRead(register)))?,
+                bytes.ok_or_else(|| refused_for(Problem::RegisterNotRead(register)))?,
             );
         }
         let refused = |refusal| DamiaoError::Refused {
@@ -99,7 +101,7 @@ pub fn start_up<const N: usize, B: Bus>(
             let (id, reply_id) = (expectation.id, expectation.reply_id);
             host.write(id, reply_id, register, value)?;
             let bytes = host.read(id, reply_id, register)?;
-            let bytes = bytes.ok_or_else(|| refused_for(Problem::NotRead(register)))?;
+            let bytes = bytes.ok_or_else(|| refused_for(Problem::RegisterNotRead(register)))?;
             let found = u32::from_le_bytes(bytes);
             let written = expectation.check_written(register, value, found);
             written.map_err(refused)?;
@@ -142,7 +144,8 @@ fn expectation<'a>(bus: &BusDescription, motor: &'a BusMotor, fd: bool) -> Expec
     }
 }
 
-/// Requests the feedback of a motor, which must be disabled and without an error but for lost communication, which is cleared.
+/// Requests the feedback of a motor, and clears the error of lost communication. The motor must be disabled and have no
+/// other error.
 fn feedback_of_disabled<B: Bus>(
     host: &mut Host<'_, B>,
     of: &Expectation<'_>,
@@ -151,14 +154,14 @@ fn feedback_of_disabled<B: Bus>(
     if let Ok(feedback) = &found
         && feedback.status == Status::CommunicationLost
     {
-        found = host.special(of.id, of.reply_id, Special::ClearError)?;
+        found = host.special(of.id, of.reply_id, SpecialCommand::ClearError)?;
         if found.is_ok() {
             found = host.feedback(of.id, of.reply_id)?;
         }
     }
     Ok(found.and_then(|feedback| match feedback.status {
         Status::Disabled => Ok(feedback),
-        Status::Enabled => Err(Problem::Enabled),
-        error => Err(Problem::Error(error)),
+        Status::Enabled => Err(Problem::AlreadyEnabled),
+        error => Err(Problem::MotorError(error)),
     }))
 }

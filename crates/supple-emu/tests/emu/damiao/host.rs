@@ -1,13 +1,13 @@
-//! A host that uses the codec and nothing of the drive: asks, enables, commands.
+//! A host that uses the codec but not the drive: sends requests, enables motors and commands torques.
 
 use supple_bus::virtual_time::DirectBus;
 use supple_bus::{Bus, Event};
 use supple_can_frame::FrameFormat;
 use supple_core::{Arm, Vector, dynamics};
-use supple_damiao::inspection::{Expectation, Inspected, Readings, TO_READ};
+use supple_damiao::inspection::{Expectation, InspectedMotor, RegisterReadings, TO_READ};
 use supple_damiao::register::{self, Operation};
 use supple_damiao::{
-    Feedback, Frame, MitCommand, Problem, Ranges, Refusal, Register, RegisterReply, Special,
+    Feedback, Frame, MitCommand, Problem, Ranges, Refusal, Register, RegisterReply, SpecialCommand,
     TorqueShaper, Value,
 };
 use supple_emu::damiao::{DamiaoArm, DamiaoConfig};
@@ -22,14 +22,14 @@ pub struct Host<const N: usize> {
     pub description: Description,
     pub arm: Arm<N>,
     pub ranges: Vec<Ranges>,
-    /// Last feedback of each motor, and the answers in the last cycle.
+    /// Last feedback of each motor.
     pub feedback: [Option<Feedback>; N],
     pub answers: [u32; N],
     shapers: [TorqueShaper; N],
     format: FrameFormat,
 }
 
-/// An arm that starts at `start_rad`, or in its home pose.
+/// Creates a host with an arm that starts at `start_rad`, or in its home pose.
 pub fn host<const N: usize>(
     name: &str,
     change: impl FnOnce(&mut DamiaoConfig),
@@ -118,7 +118,7 @@ impl<const N: usize> Host<N> {
         self.bus.send(&frame.on_bus(self.format)).unwrap();
     }
 
-    /// All frames of motors until `until_ns`, faults left out.
+    /// Receives all frames of motors until `until_ns`; ignores faults.
     pub fn receive(&mut self, until_ns: u64) -> Vec<Frame> {
         let mut frames = Vec::new();
         while let Some(event) = self.bus.receive_until(until_ns).unwrap() {
@@ -129,8 +129,8 @@ impl<const N: usize> Host<N> {
         frames
     }
 
-    /// Sends a frame and returns what arrives within 3 ms.
-    pub fn ask(&mut self, frame: Frame) -> Vec<Frame> {
+    /// Sends a frame and returns the frames that arrive within 3 ms.
+    pub fn exchange(&mut self, frame: Frame) -> Vec<Frame> {
         self.send(frame);
         let until_ns = self.bus.now_ns() + 3 * MS;
         self.receive(until_ns)
@@ -138,18 +138,18 @@ impl<const N: usize> Host<N> {
 
     /// Reads a register of a motor by its id.
     pub fn read(&mut self, id: u8, register: Register) -> Option<[u8; 4]> {
-        let answers = self.ask(register::read(id, register));
+        let answers = self.exchange(register::read(id, register));
         let mut replies = answers
             .iter()
             .filter_map(|frame| RegisterReply::parse(frame, id, Operation::Read, register));
         replies.next().map(|reply| reply.bytes)
     }
 
-    /// The start-up of one motor: identity, registers, mode and watchdog.
-    pub fn inspect(&mut self, index: usize) -> Result<Inspected, Refusal> {
+    /// Runs the start-up of one motor: checks identity and registers, sets mode and watchdog.
+    pub fn inspect(&mut self, index: usize) -> Result<InspectedMotor, Refusal> {
         let (id, reply_id) = (self.motor(index).id as u8, self.motor(index).reply_id);
         let refuse = |problem| Refusal { motor: id, problem };
-        let answers = self.ask(register::ask_feedback(id));
+        let answers = self.exchange(register::request_feedback(id));
         let feedback = match answers.as_slice() {
             [] => return Err(refuse(Problem::Silent)),
             [one] => Feedback::parse(one).unwrap(),
@@ -157,20 +157,20 @@ impl<const N: usize> Host<N> {
         };
         if answers[0].id() != reply_id {
             let found = answers[0].id();
-            return Err(refuse(Problem::ReplyId {
+            return Err(refuse(Problem::ReplyIdMismatch {
                 found,
                 expected: reply_id,
             }));
         }
         match feedback.status {
             supple_damiao::Status::Disabled => {}
-            supple_damiao::Status::Enabled => return Err(refuse(Problem::Enabled)),
-            status => return Err(refuse(Problem::Error(status))),
+            supple_damiao::Status::Enabled => return Err(refuse(Problem::AlreadyEnabled)),
+            status => return Err(refuse(Problem::MotorError(status))),
         }
-        let mut readings = Readings::new();
+        let mut readings = RegisterReadings::new();
         for register in TO_READ {
             if let Some(bytes) = self.read(id, register) {
-                readings.note(register, bytes);
+                readings.insert(register, bytes);
             }
         }
         let position_rad = feedback.position_rad(&self.ranges[index]);
@@ -183,7 +183,7 @@ impl<const N: usize> Host<N> {
             let Some(value) = value else { continue };
             // Some motors ignore the first write.
             for _ in 0..2 {
-                self.ask(register::write(id, register, Value::Integer(value)).unwrap());
+                self.exchange(register::write(id, register, Value::Integer(value)).unwrap());
             }
             let found = self.read(id, register).map_or(0, u32::from_le_bytes);
             self.expectation(index)
@@ -201,7 +201,7 @@ impl<const N: usize> Host<N> {
         })
     }
 
-    /// One cycle: sends all torques, takes all answers. Times out at `period_ns`.
+    /// Runs one cycle: sends all torques and receives the replies, for at most `period_ns`.
     pub fn cycle(&mut self, torque_nm: &Vector<N>, damping: f64, period_ns: u64) {
         let until_ns = self.bus.now_ns() + period_ns;
         for i in 0..N {
@@ -236,13 +236,13 @@ impl<const N: usize> Host<N> {
         for index in 0..N {
             self.inspect(index)?;
         }
-        // The first command before the motor is enabled: it acts from the first moment.
+        // The first command is sent before the motor is enabled, so that the torque acts as soon as it is enabled.
         self.cycle(&Vector::zeros(), 0.0, 3 * MS);
         let gravity_nm = dynamics::gravity(&self.arm, &self.joints_rad());
         self.cycle(&gravity_nm, 0.0, 3 * MS);
         for index in 0..N {
             let id = self.motor(index).id as u8;
-            self.send(Special::Enable.emit(id));
+            self.send(SpecialCommand::Enable.emit(id));
         }
         let until_ns = self.bus.now_ns() + MS;
         self.receive(until_ns);

@@ -1,11 +1,11 @@
-//! Motors that do not: each misbehaviour is refused at the start or becomes its named fault within two cycles.
+//! Tests that start-up refuses each misbehaviour, or that it becomes the corresponding fault within two cycles.
 
 use super::host::{Host, MS, host};
 use supple_bus::{Bus, BusFault, Event};
 use supple_core::Vector;
 use supple_damiao::guard::{MotorFault, MotorGuard};
 use supple_damiao::position::{JointAngle, PositionError};
-use supple_damiao::temperature::Thermal;
+use supple_damiao::temperature::TemperatureLimits;
 use supple_damiao::{Problem, Register, Status};
 use supple_emu::damiao::Misbehaviour;
 
@@ -16,7 +16,7 @@ fn misbehaving(specs: &[&str]) -> Host<7> {
     host
 }
 
-/// The refusal of a start with these misbehaviours; no motor has torque then.
+/// Starts motors with these misbehaviours and returns the refusal; asserts that no motor has torque.
 fn refusal(specs: &[&str]) -> (u8, Problem) {
     let mut host = misbehaving(specs);
     let refusal = host.start().expect_err("a refusal");
@@ -28,10 +28,10 @@ fn refusal(specs: &[&str]) -> (u8, Problem) {
 #[test]
 fn bad_motors_are_refused_at_the_start() {
     assert_eq!(refusal(&["silent:motor=4"]), (4, Problem::Silent));
-    assert_eq!(refusal(&["enabled:motor=2"]), (2, Problem::Enabled));
+    assert_eq!(refusal(&["enabled:motor=2"]), (2, Problem::AlreadyEnabled));
     assert_eq!(
         refusal(&["error:motor=5,code=B"]),
-        (5, Problem::Error(Status::MosfetHot))
+        (5, Problem::MotorError(Status::MosfetHot))
     );
     assert_eq!(
         refusal(&["same-id:motor=6,with=5"]),
@@ -39,14 +39,14 @@ fn bad_motors_are_refused_at_the_start() {
     );
     // Joints 4 and 5 have motors of other types.
     let (motor, problem) = refusal(&["swapped:motor=4,with=5"]);
-    let expected = Problem::Number {
+    let expected = Problem::NumberMismatch {
         register: Register::GEAR_RATIO,
         found: 10.0,
         expected: 40.0,
     };
     assert_eq!((motor, problem), (4, expected));
     let (motor, problem) = refusal(&["register:motor=3,number=22,value=8"]);
-    let expected = Problem::Number {
+    let expected = Problem::NumberMismatch {
         register: Register::VELOCITY_RANGE,
         found: 8.0,
         expected: 10.0,
@@ -54,23 +54,23 @@ fn bad_motors_are_refused_at_the_start() {
     assert_eq!((motor, problem), (3, expected));
     let (motor, problem) = refusal(&["register:motor=1,number=14,value=6441"]);
     assert!(
-        motor == 1 && matches!(problem, Problem::Firmware(_)),
+        motor == 1 && matches!(problem, Problem::UnsupportedFirmware(_)),
         "{problem}"
     );
     let (motor, problem) = refusal(&["no-watchdog:motor=7"]);
-    let expected = Problem::NotWritten {
+    let expected = Problem::WriteIgnored {
         register: Register::TIMEOUT,
         found: 0,
         expected: 400,
     };
     assert_eq!((motor, problem), (7, expected));
-    // A motor that replies with the id of another is found by its reply id.
+    // The reply id shows a motor that replies with the id of another motor.
     let (motor, problem) = refusal(&["register:motor=2,number=7,value=0"]);
     assert_eq!(
         (motor, problem),
         (
             2,
-            Problem::ReplyId {
+            Problem::ReplyIdMismatch {
                 found: 0,
                 expected: 0x12
             }
@@ -92,9 +92,9 @@ fn a_wrong_mode_and_an_ignored_write_are_set_right() {
     }
 }
 
-/// A whole turn is unwrapped; a zero outside of the limits is refused.
+/// A whole turn is unwrapped; a zero position that puts the angle outside the limits is refused.
 #[test]
-fn positions_of_another_turn_or_zero() {
+fn a_whole_turn_is_unwrapped_and_a_wrong_zero_is_refused() {
     let angle = |spec: &str| {
         let mut host = misbehaving(&[spec]);
         host.cycle(&Vector::zeros(), 0.0, 3 * MS);
@@ -116,11 +116,11 @@ fn positions_of_another_turn_or_zero() {
     ));
 }
 
-/// Cycles from the misbehaviour to the fault of the motor's guard, and the fault.
+/// Returns the number of cycles from the misbehaviour to the fault of the motor's guard, and the fault.
 fn fault_of(spec: &str, motor: usize) -> (u32, MotorFault) {
     let mut host = misbehaving(&[spec]);
     host.start().unwrap();
-    let thermal = Thermal::new(70.0, 80.0, 95.0).unwrap();
+    let thermal = TemperatureLimits::new(70.0, 80.0, 95.0).unwrap();
     let mut guard = MotorGuard::new(motor as u8 + 1, host.ranges[motor], thermal, 1e-3);
     let mut begun: Option<u32> = None;
     for cycle in 0..400 {
@@ -129,14 +129,14 @@ fn fault_of(spec: &str, motor: usize) -> (u32, MotorFault) {
         begun = begun.or(begun_now.then_some(cycle));
         let feedback = host.feedback[motor].filter(|_| host.answers[motor] > 0);
         if let Err(fault) = guard.cycle(feedback.as_ref(), host.answers[motor]) {
-            return (cycle - begun.expect("not before it began"), fault);
+            return (cycle - begun.expect("the misbehaviour has begun"), fault);
         }
     }
     panic!("{spec}: no fault")
 }
 
 #[test]
-fn misbehaviour_in_a_run_is_a_named_fault_within_two_cycles() {
+fn a_misbehaviour_in_a_run_becomes_its_fault_within_two_cycles() {
     for (code, status) in [
         ('8', Status::OverVoltage),
         ('9', Status::UnderVoltage),
@@ -171,7 +171,7 @@ fn misbehaviour_in_a_run_is_a_named_fault_within_two_cycles() {
     ] {
         let (cycles, fault) = fault_of(spec, motor);
         match (fault, expected) {
-            // The motor cools a little, or heats, until its feedback.
+            // The motor cools or heats slightly until its feedback.
             (MotorFault::Hot { celsius }, MotorFault::Hot { .. }) => {
                 assert!((94..=97).contains(&celsius))
             }
@@ -186,12 +186,12 @@ fn misbehaviour_in_a_run_is_a_named_fault_within_two_cycles() {
     );
 }
 
-/// Every third reply lost: never two in a row, so no fault, and the state's age is known.
+/// Every third reply is lost: never two in a row, so there is no fault, and the age of the state is known.
 #[test]
-fn single_lost_replies_are_bridged() {
+fn single_lost_replies_are_tolerated() {
     let mut host = misbehaving(&["reply-lost:motor=2,every=3,at-s=0.01"]);
     host.start().unwrap();
-    let thermal = Thermal::new(70.0, 80.0, 95.0).unwrap();
+    let thermal = TemperatureLimits::new(70.0, 80.0, 95.0).unwrap();
     let mut guard = MotorGuard::new(2, host.ranges[1], thermal, 1e-3);
     let mut lost = 0;
     for _ in 0..200 {
@@ -203,16 +203,16 @@ fn single_lost_replies_are_bridged() {
     assert!((55..=70).contains(&lost), "{lost}");
 }
 
-/// Ids of two joints with motors of one type exchanged: every register fits, but a push at one joint moves the other's
-/// encoder.
+/// The ids of two motors of one type are exchanged: every register matches, but a torque at one joint moves the encoder of
+/// the other joint.
 #[test]
-fn exchanged_ids_of_equal_motors_show_in_a_small_motion() {
+fn a_small_motion_reveals_exchanged_ids_of_equal_motors() {
     for swapped in [false, true] {
         let specs: &[&str] = match swapped {
             true => &["swapped:motor=5,with=7"],
             false => &[],
         };
-        // Hanging, gravity moves neither.
+        // In the hanging pose, gravity moves neither joint.
         let mut host = host::<7>("openarm", |_| {}, Some(Vector::zeros()));
         let parsed: Vec<Misbehaviour> = specs.iter().map(|spec| spec.parse().unwrap()).collect();
         host.bus.0.misbehave(&parsed).unwrap();
@@ -228,7 +228,7 @@ fn exchanged_ids_of_equal_motors_show_in_a_small_motion() {
         let moved_rad = host.joints_rad() - before_rad;
         let truly_rad = host.emulated().truth().position_rad - true_before_rad;
         assert!(moved_rad[4] > 0.02, "{moved_rad}");
-        // The encoder that answers to joint 5 moves in both cases: only the model, or another look at the arm, shows it.
+        // The encoder with the id of joint 5 moves in both cases; only the model, or another measurement, reveals the exchange.
         let found = if truly_rad[4].abs() > truly_rad[6].abs() {
             4
         } else {
@@ -239,7 +239,7 @@ fn exchanged_ids_of_equal_motors_show_in_a_small_motion() {
 }
 
 #[test]
-fn a_bus_off_and_a_wedged_adapter() {
+fn a_bus_off_recovers_and_a_wedged_adapter_sends_no_frames() {
     let mut host = misbehaving(&["bus-off:at-s=0.02"]);
     host.start().unwrap();
     let until_ns = host.bus.now_ns() + 300 * MS;
@@ -259,9 +259,9 @@ fn a_bus_off_and_a_wedged_adapter() {
 }
 
 #[test]
-fn specifications_are_checked() {
+fn invalid_specifications_are_rejected_with_the_reason() {
     for (text, words) in [
-        ("flat:motor=1", "there is no kind `flat`"),
+        ("flat:motor=1", "the kind `flat` does not exist"),
         ("silent", "motor is missing"),
         ("silent:motor=0", "motors count from 1"),
         ("error:motor=1,code=1", "from 2 to F"),

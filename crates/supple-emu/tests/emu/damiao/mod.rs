@@ -1,4 +1,4 @@
-//! Emulated Damiao motors, as a host observes them on the bus.
+//! Tests of emulated Damiao motors, as a host observes them on the bus.
 
 mod host;
 mod misbehaving;

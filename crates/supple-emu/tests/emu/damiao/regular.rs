@@ -1,9 +1,9 @@
-//! Motors that do what they should.
+//! Tests of motors without misbehaviour.
 
 use super::host::{Host, MS, host, host_with_options};
 use supple_bus::Bus;
 use supple_core::{Vector, dynamics};
-use supple_damiao::{Request, Special, Status, flash, register};
+use supple_damiao::{Request, SpecialCommand, Status, flash, register};
 use supple_emu::damiao::MotorEvent;
 use supple_plant::PlantOptions;
 
@@ -32,7 +32,7 @@ fn starts_and_holds<const N: usize>(name: &str, period_ns: u64) {
     let busy_ns = host.emulated().bus_busy_ns();
     let cycles = (500 * MS / period_ns) as u32;
     host.hold(cycles, period_ns);
-    // Every motor answered every command, within the period.
+    // Every motor replied to every command within the period.
     assert_eq!(host.answers, [1; N]);
     let load =
         (host.emulated().bus_busy_ns() - busy_ns) as f64 / (f64::from(cycles) * period_ns as f64);
@@ -41,17 +41,17 @@ fn starts_and_holds<const N: usize>(name: &str, period_ns: u64) {
     assert!(sag_m < 2e-3, "{name} sags by {sag_m} m");
 }
 
-/// Gravity torque from the first frame: no step, no sag beyond 2 mm. Seven motors on FD at 1 kHz, six on classic CAN at
-/// 400 Hz, each with a fifth of the bus to spare.
+/// With gravity torque from the first frame on, the arm sags by less than 2 mm. Seven motors use FD at 1 kHz, six use
+/// classic CAN at 400 Hz; a fifth of the bus time is free.
 #[test]
 fn an_arm_is_enabled_without_a_sag() {
     starts_and_holds::<7>("openarm", MS);
     starts_and_holds::<6>("yam", 5 * MS / 2);
 }
 
-/// Registers are set in RAM alone, and nothing asks for flash or a zero.
+/// Start-up sets registers in RAM only, and requests neither a flash write nor a zero position.
 #[test]
-fn the_start_leaves_flash_alone() {
+fn start_up_does_not_write_flash() {
     let mut host = host::<7>("openarm", |config| config.allow_flash = true, None);
     host.start().unwrap();
     host.hold(100, MS);
@@ -65,34 +65,34 @@ fn the_start_leaves_flash_alone() {
 
 #[test]
 #[should_panic(expected = "write its flash: SetZero")]
-fn a_set_zero_ends_the_emulation() {
+fn a_set_zero_request_ends_the_emulation() {
     let mut host = host::<7>("openarm", |_| {}, None);
-    host.ask(flash::set_zero(2));
+    host.exchange(flash::set_zero(2));
 }
 
 #[test]
 #[should_panic(expected = "write its flash: StoreAll")]
-fn a_store_ends_the_emulation() {
+fn a_store_request_ends_the_emulation() {
     let mut host = host::<7>("openarm", |_| {}, None);
-    host.ask(flash::store_all(3));
+    host.exchange(flash::store_all(3));
 }
 
 #[test]
 fn flash_is_written_where_it_is_allowed() {
     let mut host = host::<7>("openarm", |config| config.allow_flash = true, None);
-    host.ask(flash::set_zero(2));
+    host.exchange(flash::set_zero(2));
     assert!(
         host.emulated()
             .events()
             .iter()
             .any(|(_, event)| *event == MotorEvent::Flash(1, Request::SetZero))
     );
-    let feedback = host.ask(register::ask_feedback(2));
+    let feedback = host.exchange(register::request_feedback(2));
     let found = supple_damiao::Feedback::parse(&feedback[0]).unwrap();
     assert!(found.position_rad(&host.ranges[1]).abs() < 1e-3);
 }
 
-/// A lost host: the motor's own watchdog ends the torque within 20 ms, and the arm falls, as it has no brakes.
+/// If the host stops, the watchdog of each motor ends the torque within 20 ms, and the arm falls, because it has no brakes.
 #[test]
 fn the_watchdog_ends_the_torque_of_a_lost_host() {
     let mut host = host::<7>("openarm", |_| {}, None);
@@ -114,17 +114,17 @@ fn the_watchdog_ends_the_torque_of_a_lost_host() {
     );
     assert_eq!(host.emulated().motor_torque_nm(), Vector::<7>::zeros());
     assert!(distance_m(before, tip_m(&host)) > 0.05);
-    // An error stays until it is cleared, and enabling does not clear it.
-    host.ask(Special::Enable.emit(1));
+    // An error stays until the host clears it; enabling does not clear it.
+    host.exchange(SpecialCommand::Enable.emit(1));
     assert_eq!(
         host.emulated().motors()[0].status(),
         Status::CommunicationLost
     );
-    host.ask(Special::ClearError.emit(1));
+    host.exchange(SpecialCommand::ClearError.emit(1));
     assert_eq!(host.emulated().motors()[0].status(), Status::Disabled);
 }
 
-/// Positions come in steps of 381 urad, rounded down; the motor applies the torque of the code it got.
+/// Positions have steps of 381 urad, rounded down; the motor applies the torque of the received code.
 #[test]
 fn positions_and_torques_have_the_steps_of_the_frames() {
     let mut host = host::<7>("openarm", |_| {}, None);
@@ -143,7 +143,7 @@ fn positions_and_torques_have_the_steps_of_the_frames() {
     }
 }
 
-/// Way of the tip of an arm whose motors are disabled, in 0.4 s from a pose \[m\].
+/// Returns the distance that the tip of an arm with disabled motors moves in 0.4 s from a pose \[m\].
 fn fall_m<const N: usize>(name: &str, start_rad: Option<Vector<N>>) -> f64 {
     let mut host = host::<N>(name, |config| config.supported = false, start_rad);
     let before = tip_m(&host);
@@ -163,9 +163,9 @@ fn a_disabled_arm_falls_unless_it_is_stowed() {
     assert!(stays_m < 2e-3, "yam moves {stays_m} m in its stow pose");
 }
 
-/// The torque that acts is the commanded one times the motor's own scale.
+/// The applied torque is the commanded torque times the torque scale of the motor.
 #[test]
-fn the_torque_scale_is_the_plants() {
+fn the_plant_applies_the_torque_scale_of_the_motor() {
     let options = PlantOptions {
         torque_constant_fraction: Some(0.3),
         ..PlantOptions::default()

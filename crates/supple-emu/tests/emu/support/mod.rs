@@ -35,7 +35,7 @@ pub fn frame(id: u32, payload: &[u8]) -> CanFrame {
 pub struct Host(DirectBus<Emulator<4>>);
 
 impl Host {
-    /// An arm in its home pose, in the emergency stop.
+    /// Creates an arm in its home pose, in emergency stop.
     pub fn new(config: EmulatorConfig) -> Host {
         let description = Description::asset("wam4").unwrap();
         let plant = PlantConfig::<4>::from_description(&description).unwrap();
@@ -45,7 +45,7 @@ impl Host {
         ))
     }
 
-    /// An arm that is awake and zeroed, in idle.
+    /// Creates an arm in idle, whose pucks are awake and have their position reference.
     pub fn awake() -> Host {
         Host::new(EmulatorConfig {
             zeroed: true,
@@ -53,7 +53,7 @@ impl Host {
         })
     }
 
-    /// An active arm, in torque mode.
+    /// Creates an active arm, in torque mode.
     pub fn active() -> Host {
         let mut host = Host::awake();
         host.press(ButtonPress::Activate);
@@ -82,7 +82,7 @@ impl Host {
         self.0.send(&frame(id, payload)).unwrap();
     }
 
-    /// All events within a time.
+    /// Receives all events within a time.
     pub fn listen(&mut self, duration_ns: u64) -> Vec<(u64, Event)> {
         let until_ns = self.now_ns() + duration_ns;
         let mut events = Vec::new();
@@ -92,7 +92,7 @@ impl Host {
         events
     }
 
-    /// Frames of other nodes within a time, as id and payload.
+    /// Receives the frames of other nodes within a time, as id and payload.
     pub fn receive_frames(&mut self, duration_ns: u64) -> Vec<(u32, Vec<u8>)> {
         let events = self.listen(duration_ns).into_iter();
         events
@@ -103,7 +103,7 @@ impl Host {
             .collect()
     }
 
-    /// Payload of a node's reply to a request, `None` after a millisecond.
+    /// Requests a property; returns the payload of the reply, `None` after a millisecond.
     pub fn get(&mut self, node: u8, property: u8) -> Option<Vec<u8>> {
         self.send(u32::from(node), &[property]);
         let from = |id: u32| id & 0x3e0 == u32::from(node) << 5;
@@ -114,7 +114,7 @@ impl Host {
             .next()
     }
 
-    /// Value of a property of 16 or 32 bits.
+    /// Reads a property of 16 or 32 bits.
     pub fn value(&mut self, node: u8, property: u8) -> i32 {
         let reply = self.get(node, property).expect("a reply");
         assert_eq!(reply[..2], [property | 0x80, 0]);
@@ -131,7 +131,7 @@ impl Host {
         self.listen(MS / 5);
     }
 
-    /// A position request to the whole arm every millisecond, without torques.
+    /// Requests the positions of the whole arm every millisecond, without sending torques.
     pub fn cycles(&mut self, cycles: usize) {
         for _ in 0..cycles {
             self.send(0x404, &[P]);
@@ -143,7 +143,7 @@ impl Host {
         self.value(MODULE, MODE)
     }
 
-    /// The five three-bit fields of the pendant word: velocity, torque, voltage, heartbeat, other.
+    /// Reads the five three-bit fields of the pendant word: velocity, torque, voltage, heartbeat, other.
     pub fn lamps(&mut self) -> [i32; 5] {
         let word = self.value(MODULE, PEN);
         core::array::from_fn(|field| word >> (3 * field) & 0b111)

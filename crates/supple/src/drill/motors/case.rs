@@ -21,54 +21,54 @@ pub const TASKS: [Task; 3] = [Task::GravityHold, Task::Move, Task::Track];
 /// Event.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Event {
-    /// None; the run ends as by Ctrl-C.
+    /// No event; the run ends as after Ctrl-C.
     Nothing,
-    /// A motor or the bus misbehaves, as `supple-emu --misbehave` names it, without a time.
+    /// A motor or the bus misbehaves.
     Misbehaves {
-        /// Kind with its keys.
+        /// Specification for `supple-emu --misbehave`, without a time.
         spec: String,
-        /// Motor, counted from 0, whose joint then has no torque: its speed is not judged.
+        /// Motor, counted from 0, whose joint then has no torque, so that its speed is not evaluated.
         without: Option<usize>,
     },
-    /// The operator wants idle.
+    /// The operator requests idle.
     Idle,
     /// The controller is killed.
     KillController,
-    /// The process of the bus is killed, by the wall clock.
+    /// The process of the bus is killed, in wall-clock time.
     KillHost,
-    /// It is stopped (SIGSTOP), by the wall clock.
+    /// The process of the bus is stopped (SIGSTOP), in wall-clock time.
     StopHost,
-    /// `supple up` is killed, by the wall clock.
+    /// `supple up` is killed, in wall-clock time.
     KillUp,
 }
 
 /// Expected result.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Expected {
-    /// It goes on; at the end of the run the arm is laid down.
+    /// The system keeps running; at the end of the run the arm is laid down.
     KeepsRunning,
-    /// The loop names this reason within this time \[ms\]; the arm is held, laid down, disabled.
+    /// The plant loop reports a reason in time; the arm is held, laid down, then disabled.
     LaidDown {
-        /// What the reason contains.
+        /// Text that the reason contains.
         reason: String,
-        /// Time \[ms\].
+        /// Maximum time from the event \[ms\].
         within_ms: f64,
     },
-    /// The loop names a reason, or the controller latches one of these faults, within this time \[ms\]; the arm is laid
-    /// down after the loss, or held by the controller in its fault.
+    /// The plant loop reports a reason, or the controller latches a fault, in time; the arm is laid down after the loss, or held
+    /// by the controller in its fault.
     Fault {
-        /// What the reason of the loop contains, if it is the first to notice.
+        /// Text that the reason of the plant loop contains, if the loop detects the event first.
         reason: Option<String>,
-        /// Names of the controller's faults.
+        /// Names of the valid faults of the controller.
         names: &'static [&'static str],
-        /// Time \[ms\].
+        /// Maximum time from the event \[ms\].
         within_ms: f64,
     },
-    /// All motors end their torque by their own watchdog. The time counts from the last command that they got \[ms\].
-    TorqueGone {
-        /// What the loop, if there still is one, names.
+    /// The watchdogs of all motors end their torque. The time counts from the last command that the motors received.
+    TorqueEnds {
+        /// Text of the reason that the plant loop reports, if it still runs.
         reason: Option<&'static str>,
-        /// Time \[ms\].
+        /// Maximum time from the event \[ms\].
         within_ms: f64,
     },
 }
@@ -85,7 +85,7 @@ pub struct Case {
 }
 
 impl Case {
-    /// Whether the case runs by the wall clock instead of in virtual time.
+    /// Whether the case runs in wall-clock time instead of virtual time.
     pub fn runs_in_wall_clock_time(&self) -> bool {
         matches!(
             self.event,
@@ -93,7 +93,7 @@ impl Case {
         )
     }
 
-    /// Joint whose motor has no torque.
+    /// Returns the joint whose motor has no torque.
     pub fn without(&self) -> Option<usize> {
         match self.event {
             Event::Misbehaves { without, .. } => without,
@@ -150,7 +150,7 @@ impl fmt::Display for Expected {
                     names.join(" or ")
                 )
             }
-            Expected::TorqueGone { reason, within_ms } => {
+            Expected::TorqueEnds { reason, within_ms } => {
                 write!(
                     f,
                     "no torque {within_ms:.0} ms after the last command, by the motors' watchdog"
@@ -164,7 +164,7 @@ impl fmt::Display for Expected {
     }
 }
 
-/// The name, as used by `--only` and `--list`.
+/// Writes the name, as used by `--only` and `--list`.
 impl fmt::Display for Case {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "emu/{}/{}", self.task, self.event)

@@ -1,4 +1,4 @@
-//! What the processes of bus and arm reported: losses, stages and states of motors, with times of the arm's clock.
+//! Reads the reports of the processes of bus and arm: losses, stages and motor states, with times of the arm's clock.
 
 use std::path::Path;
 use supple_cli::exit::Failure;
@@ -11,20 +11,20 @@ const MAX_BYTES: u64 = 1 << 24;
 pub enum Stage {
     /// The arm is held.
     Holding,
-    /// It is laid down.
+    /// The arm is being laid down.
     LayingDown,
     /// The motors are being disabled.
     Disabling,
-    /// They are disabled.
+    /// The motors are disabled.
     Disabled,
 }
 
 /// The reports of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Course {
+pub struct ReportedCourse {
     /// Stages in order: time \[s\], stage, reason.
     pub stages: Vec<(f64, Stage, String)>,
-    /// Beginnings of misbehaviour \[s\].
+    /// Times at which a misbehaviour began \[s\].
     pub misbehaves_s: Vec<f64>,
     /// Motors, counted from 0, whose watchdog ended the torque: time \[s\], motor, time since their last command \[ms\].
     pub watchdogs: Vec<(f64, usize, f64)>,
@@ -36,19 +36,19 @@ pub struct Course {
     pub errors: Vec<String>,
 }
 
-impl Course {
+impl ReportedCourse {
     /// Reads a file of reports.
     ///
     /// # Errors
     /// [`Failure::File`].
-    pub fn read(file: &Path) -> Result<Course, Failure> {
+    pub fn read(file: &Path) -> Result<ReportedCourse, Failure> {
         let text = supple_files::read_text(file, MAX_BYTES)
             .map_err(|error| Failure::file("read", file, error))?;
-        Ok(Course::parse(&text))
+        Ok(ReportedCourse::parse(&text))
     }
 
-    fn parse(text: &str) -> Course {
-        let mut course = Course::default();
+    fn parse(text: &str) -> ReportedCourse {
+        let mut course = ReportedCourse::default();
         for line in text.lines() {
             if line.contains(": error: ") {
                 course.errors.push(line.to_owned());
@@ -94,7 +94,7 @@ impl Course {
         }
     }
 
-    /// First loss from this time on: time \[s\] and reason.
+    /// Returns the first loss from this time on: time \[s\] and reason.
     pub fn loss(&self, from_s: f64) -> Option<(f64, &str)> {
         let found = self.stages.iter().find(|(time_s, stage, _)| {
             *time_s >= from_s && matches!(stage, Stage::Holding | Stage::Disabling)
@@ -102,7 +102,7 @@ impl Course {
         found.map(|(time_s, _, reason)| (*time_s, reason.as_str()))
     }
 
-    /// Time of a stage from this time on \[s\].
+    /// Returns the time of a stage from this time on \[s\].
     pub fn stage_s(&self, stage: Stage, from_s: f64) -> Option<f64> {
         let found = self
             .stages
@@ -111,14 +111,14 @@ impl Course {
         found.map(|(time_s, ..)| *time_s)
     }
 
-    /// Stages from this time on.
+    /// Returns the stages from this time on.
     pub fn stages(&self, from_s: f64) -> Vec<Stage> {
         let later = self.stages.iter().filter(|(time_s, ..)| *time_s >= from_s);
         later.map(|(_, stage, _)| *stage).collect()
     }
 }
 
-/// Time \[s\] and text of a line `PROGRAM: TIME s: TEXT`.
+/// Parses time \[s\] and text of a line `PROGRAM: TIME s: TEXT`.
 fn timed<'a>(line: &'a str, program: &str) -> Option<(f64, &'a str)> {
     let (time_s, what) = line.strip_prefix(program)?.split_once(" s: ")?;
     Some((time_s.parse().ok()?, what))
@@ -130,7 +130,7 @@ mod tests {
 
     #[test]
     fn stages_states_and_errors_are_read() {
-        let course = Course::parse(
+        let course = ReportedCourse::parse(
             "supple-can: bus unix:/run/x\n\
              supple-emu: 0.0310 s: all motors enabled\n\
              supple-can: active\n\

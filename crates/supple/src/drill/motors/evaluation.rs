@@ -1,19 +1,19 @@
-//! Compares what happened with the expected result.
+//! Compares the actual with the expected result.
 
 use super::case::{Case, Event, Expected};
-use super::course::{Course, Stage};
+use super::course::{ReportedCourse, Stage};
 use super::metrics::Metrics;
 
 /// Speed that no joint with a motor may exceed while the arm is held and laid down, if it was slower before
 /// \[rad/s\].
 const SLOW_RAD_PER_S: f64 = 0.5;
-/// Speed that no joint reaches that damping motors let fall: three times the limit of the joints of OpenArm and YAM \[rad/s\].
+/// Speed that a joint falling against damping does not reach: three times the limit of the joints of OpenArm and YAM \[rad/s\].
 const FALL_RAD_PER_S: f64 = 6.0;
-/// Share by which a joint that was faster may exceed its speed.
+/// Ratio by which a joint that was faster may exceed its speed before the event.
 const FASTER: f64 = 1.1;
 /// Distance by which the tip may sink while the arm is held \[mm\].
 const SANK_MM: f64 = 30.0;
-/// Stages of an arm that cannot be held: a joint above its speed limit is damped and its motors are disabled at rest.
+/// Stages of an arm that cannot be held: with a joint above its speed limit, the motors damp and are disabled at standstill.
 const DAMPED: [Stage; 3] = [Stage::Holding, Stage::Disabling, Stage::Disabled];
 /// Stages of an arm that is laid down.
 const LAID_DOWN: [Stage; 4] = [
@@ -27,7 +27,7 @@ const LAID_DOWN: [Stage; 4] = [
 pub fn evaluate(
     case: &Case,
     joints: usize,
-    course: &Course,
+    course: &ReportedCourse,
     metrics: &Metrics,
     event_s: f64,
 ) -> (String, Vec<String>) {
@@ -102,7 +102,7 @@ pub fn evaluate(
                 ),
             );
         }
-        Expected::TorqueGone {
+        Expected::TorqueEnds {
             reason: expected,
             within_ms,
         } => {
@@ -132,7 +132,7 @@ pub fn evaluate(
         !metrics.enabled_at_end,
         "a motor is enabled at the end".to_owned(),
     );
-    let held = !matches!(case.expected, Expected::TorqueGone { .. })
+    let held = !matches!(case.expected, Expected::TorqueEnds { .. })
         && !case.is_without_carrier()
         && case.event != Event::KillUp;
     if held {
@@ -145,7 +145,7 @@ pub fn evaluate(
                 metrics.fastest_rad_per_s
             ),
         );
-        // What a motor without torque carries falls.
+        // The part of the arm that a motor without torque carries falls.
         if matches!(case.expected, Expected::LaidDown { .. }) && case.without().is_none() {
             expect(
                 metrics.sank_mm <= SANK_MM,
@@ -157,7 +157,7 @@ pub fn evaluate(
 }
 
 impl Case {
-    /// Whether a motor that carries the arm has no torque: nothing holds its joint.
+    /// Whether a motor that carries the arm has no torque, so that its joint is not held.
     fn is_without_carrier(&self) -> bool {
         self.without() == Some(1) || matches!(self.expected, Expected::Fault { .. })
     }

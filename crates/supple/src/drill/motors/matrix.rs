@@ -1,28 +1,28 @@
-//! All test cases with their expected results, for an arm of any number of joints. They were written before the first
-//! run, except for the time of a killed controller, which allows for telemetry that ends with it, and for the sinking tip,
-//! which is not judged where a motor is lost.
+//! All test cases with their expected results, for an arm with any number of joints. The expectations were written before
+//! the first run, with two exceptions: the time after a killed controller, which allows for its missing telemetry, and the
+//! sinking of the tip, which is not evaluated if a motor is lost.
 //!
-//! Most events hit the last motor of the wrist, on which the arm's weight does not rest, so that what the others do can be
-//! judged; some hit the shoulder's second motor, which carries the arm, or the elbow's.
+//! Most events affect the last motor of the wrist, which does not carry the arm's weight, so that the reaction of the other
+//! motors can be evaluated. Some affect the second motor of the shoulder, which carries the arm, or the motor of the elbow.
 
 use super::super::matrix::{ENCODER_LOSS_FAULTS, WRONG_DIRECTION_FAULTS};
 use super::case::{Case, Event, Expected, TASKS, Task};
 
 /// Resolution of the reported times \[ms\].
 const RESOLUTION_MS: f64 = 0.1;
-/// Cycles within which a fault that a motor reports is named, and one that shows in missing replies: the event falls into
-/// a cycle, and one lost reply is tolerated.
+/// Number of cycles within which the plant loop reports a motor fault, or missing replies: the event occurs within a cycle, and
+/// one lost reply is tolerated.
 const NAMED_CYCLES: f64 = 2.0;
 const SILENT_CYCLES: f64 = 3.0;
-/// Answers that do not come for 10 ms are a loss \[ms\].
+/// Time without answers after which the controller counts as lost \[ms\].
 const ANSWER_MS: f64 = 10.0;
-/// Cycles whose telemetry may end with the controller: the time counts from the last one that arrived.
+/// Number of cycles whose telemetry may be lost with the controller: the time counts from the last received cycle.
 const UNSEEN_CYCLES: f64 = 6.0;
-/// Faults that show in the motion alone \[ms\].
+/// Maximum detection time of faults that are observable only in the motion \[ms\].
 const MOTION_MS: f64 = 1100.0;
-/// The motors' watchdog, 20 ms in units of its step \[ms\].
+/// Watchdog time of the motors, 20 ms rounded up to its resolution \[ms\].
 const WATCHDOG_MS: f64 = 20.5;
-/// Error codes with what the loop reports of them.
+/// Error codes with the reports of the plant loop.
 const ERRORS: [(&str, &str); 8] = [
     ("8", "reports over-voltage"),
     ("9", "reports under-voltage"),
@@ -33,7 +33,7 @@ const ERRORS: [(&str, &str); 8] = [
     ("E", "reports overload"),
     ("5", "reports unknown code 0x5"),
 ];
-/// Faults of the controller when a motor does not give the torque that it is asked for.
+/// Valid faults of the controller if a motor does not apply the commanded torque.
 const WEAK_MOTOR_FAULTS: &[&str] = WRONG_DIRECTION_FAULTS;
 
 /// All test cases of an arm with this number of joints, at this period \[s\].
@@ -72,7 +72,7 @@ pub fn all(joints: usize, period_s: f64) -> Vec<Case> {
             laid_down(of(motor, "is disabled and nobody disabled it"), named_ms),
         ));
     }
-    // One lost reply is bridged; two in a row are a lost encoder.
+    // One lost reply is tolerated; two in a row are a lost encoder.
     events.push((
         misbehaves(format!("reply-lost:motor={wrist},every=50"), None),
         Expected::KeepsRunning,
@@ -90,7 +90,7 @@ pub fn all(joints: usize, period_s: f64) -> Vec<Case> {
         laid_down(of(wrist, "did not reply in two cycles"), silent_ms),
     ));
 
-    // Temperature: a warning, less torque, then a fault.
+    // Temperature: a warning, reduced torque, then a fault.
     for celsius in [75, 90] {
         events.push((
             misbehaves(format!("hot:motor={wrist},celsius={celsius}"), None),
@@ -117,7 +117,7 @@ pub fn all(joints: usize, period_s: f64) -> Vec<Case> {
         ),
         laid_down(of(wrist, "reports a position that jumped"), named_ms),
     ));
-    // No register is read in the cycle: a motor that gives no torque, or a fraction of it, shows in the motion.
+    // The cycle reads no registers: a motor without torque, or with reduced torque, is detected from the motion.
     let less_torque = misbehaves(
         format!("register:motor={shoulder},number=23,value=10"),
         Some(shoulder - 1),
@@ -136,7 +136,7 @@ pub fn all(joints: usize, period_s: f64) -> Vec<Case> {
             },
         ));
     }
-    // A wrong sign in the set-up: holding drives the arm, damping does not.
+    // With a wrong torque sign, the holding torque accelerates the arm, damping does not.
     events.push((
         misbehaves(format!("torque-sign:motor={shoulder}"), None),
         Expected::Fault {
@@ -160,7 +160,7 @@ pub fn all(joints: usize, period_s: f64) -> Vec<Case> {
     ] {
         events.push((
             misbehaves(spec.to_owned(), None),
-            Expected::TorqueGone {
+            Expected::TorqueEnds {
                 reason: Some(reason),
                 within_ms: WATCHDOG_MS,
             },
@@ -182,13 +182,13 @@ pub fn all(joints: usize, period_s: f64) -> Vec<Case> {
     for event in [Event::KillHost, Event::StopHost] {
         events.push((
             event,
-            Expected::TorqueGone {
+            Expected::TorqueEnds {
                 reason: None,
                 within_ms: WATCHDOG_MS,
             },
         ));
     }
-    // By the wall clock: from the signal, which all processes get.
+    // In wall-clock time, counted from the signal, which all processes receive.
     events.push((
         Event::KillUp,
         laid_down("the program is shutting down".to_owned(), 1000.0),
@@ -199,7 +199,7 @@ pub fn all(joints: usize, period_s: f64) -> Vec<Case> {
             task: *task,
             event: event.clone(),
             expected: match task {
-                // The shoulder sinks to where it hangs, as slowly as under a hand that leads it with 5 N.
+                // The shoulder sinks to its hanging pose, as slowly as if a hand guided it with 5 N.
                 Task::GravityHold if *event == less_torque => Expected::KeepsRunning,
                 _ => expected.clone(),
             },

@@ -6,13 +6,13 @@ use serde::Serialize;
 /// Metrics after the event.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Metrics {
-    /// Time from the event until the loop names a loss \[ms\].
+    /// Time from the event until the plant loop reports a loss \[ms\].
     pub named_after_ms: Option<f64>,
     /// Reason of the loss.
     pub reason: Option<String>,
     /// Name of the controller's fault.
     pub fault: Option<&'static str>,
-    /// Time from the event to that fault \[ms\].
+    /// Time from the event to the controller's fault \[ms\].
     pub fault_after_ms: Option<f64>,
     /// Maximum time from a motor's last command until its watchdog ended its torque \[ms\].
     pub torque_gone_ms: Option<f64>,
@@ -23,19 +23,19 @@ pub struct Metrics {
     /// Speed of the fastest joint from the event until the motors are disabled, without the joint whose motor has no torque
     /// \[rad/s\].
     pub fastest_rad_per_s: f64,
-    /// That joint, counted from 0.
+    /// The fastest joint, counted from 0.
     pub fastest_joint: usize,
     /// Speed of the fastest joint before the event \[rad/s\].
     pub before_rad_per_s: f64,
     /// Distance by which the tip sinks from the event until it is laid down \[mm\].
     pub sank_mm: f64,
-    /// Number of motors with torque at the end of the trace.
+    /// Whether a motor has torque at the end of the trace.
     pub enabled_at_end: bool,
 }
 
 impl Metrics {
-    /// Takes the motion from the rows of a trace: `from_s` the event, `laid_s` the beginning of laying down, `until_s` the
-    /// end of torque \[s\]; the joint `without` is not judged.
+    /// Adds the motion from the rows of a trace; `from_s` is the time of the event, `laid_s` the start of laying down, `until_s`
+    /// the end of torque \[s\]. The joint `without` is not evaluated.
     pub fn motion(
         &mut self,
         rows: &[TraceRow],
@@ -52,7 +52,7 @@ impl Metrics {
                 .filter(|(joint, _)| Some(*joint) != without);
             for (joint, speed) in judged {
                 if time_s < from_s {
-                    // What happened before the task began is not of interest.
+                    // Motion before the task is ignored.
                     if time_s > from_s - 0.3 {
                         self.before_rad_per_s = self.before_rad_per_s.max(speed.abs());
                     }

@@ -2,12 +2,11 @@
 //!
 //! | event | test method |
 //! |---|---|
-//! | a motor or the bus misbehaves; the controller is killed; the operator wants idle | in virtual time: the processes run in lockstep |
-//! | the process of the bus or `supple up` is killed or stopped | by the wall clock |
+//! | a motor or the bus misbehaves; the controller is killed; the operator requests idle | in virtual time: the processes run in lockstep |
+//! | the process of the bus or `supple up` is killed or stopped | in wall-clock time |
 //!
-//! What happened is read from what the processes of bus and arm report (`supple-can` names the loss and the stages,
-//! `supple-emu` the motors' states, both with times of the arm's clock) and from the arm's trace: how fast the joints
-//! move, how far the tip sinks.
+//! The result is read from the reports of the processes (`supple-can` reports the loss and the stages, `supple-emu` the motor
+//! states, both with times of the arm's clock) and from the arm's trace (speeds of the joints, sinking of the tip).
 
 mod case;
 mod course;

@@ -28,7 +28,7 @@ pub struct Row {
 }
 
 impl Row {
-    /// Result of a test case.
+    /// Creates the result of a test case.
     pub fn new(case: &Case, metrics: Metrics, outcome: String, deviations: Vec<String>) -> Row {
         Row {
             name: case.to_string(),
@@ -41,7 +41,7 @@ impl Row {
         }
     }
 
-    /// Result of a test case that could not be run.
+    /// Creates the result of a test case that could not be run.
     pub fn failed(case: &Case, message: &str) -> Row {
         let deviations = vec![format!("could not be run: {message}")];
         Row::new(case, Metrics::default(), "-".to_owned(), deviations)
@@ -109,7 +109,7 @@ from the process of the bus; times are those of the arm's clock.
 - A run in which nothing is lost ends as by Ctrl-C, which lays the arm down too.
 ";
 
-/// Formats the results as a Markdown page that states its command line.
+/// Formats the results as a Markdown page that contains its command line.
 pub fn page(rows: &[Row], command: &str) -> String {
     let passed = rows.iter().filter(|row| row.as_expected).count();
     let introduction = PAGE.replace("{command}", command);

@@ -1,7 +1,7 @@
 //! Runs a test case.
 
 use super::case::{Case, Event, Expected, Task};
-use super::course::{Course, Stage};
+use super::course::{ReportedCourse, Stage};
 use super::evaluation::evaluate;
 use super::metrics::Metrics;
 use super::page::Row;
@@ -26,19 +26,19 @@ use supple_realtime::{monotonic_ns, pause};
 /// Time from the beginning of the task to the event \[s\], for each task.
 const HELD_S: f64 = 0.5;
 const MOVED_S: f64 = 1.0;
-/// The sinusoid begins slowly.
+/// Time to the event in the sinusoid, which begins slowly \[s\].
 const TRACKED_S: f64 = 1.5;
 /// Move of the elbow \[rad\] and its duration \[s\].
 const MOVE_RAD: f64 = -0.3;
 const MOVE_S: f64 = 3.0;
-/// Time from the event to the end of a run that goes on, and of one in which the arm is laid down \[s\].
+/// Time from the event to the end of the run, if the system keeps running and if the arm is laid down \[s\].
 const GOES_ON_S: f64 = 3.0;
 const LAID_DOWN_S: f64 = 14.0;
-/// Time without telemetry after which a lost arm is looked at: it is no longer waited for if the watchdogs of all motors
-/// have ended their torque, or after the longer time.
+/// Time without telemetry after which the run ends if the watchdogs of all motors have ended their torque; otherwise the run
+/// ends after the longer time.
 const SILENCE: Duration = Duration::from_secs(2);
 const LONG_SILENCE: Duration = Duration::from_secs(30);
-/// Timeout of a run by the wall clock; the longest takes a minute in an unoptimised build.
+/// Timeout of a run in wall-clock time; the longest run takes a minute in an unoptimised build.
 const TIMEOUT: Duration = Duration::from_secs(400);
 /// Observation by the wall clock after the host is lost, and timeout for an arm that is laid down.
 const OBSERVED: Duration = Duration::from_millis(400);
@@ -46,10 +46,10 @@ const LAY_DOWN_TIMEOUT: Duration = Duration::from_secs(40);
 /// Process of the bus.
 const HOST: &str = "supple-can";
 
-/// What a run left behind.
-struct Left {
+/// Output of a run.
+struct RunOutput {
     samples: Vec<ControllerSample>,
-    /// Time of the event, if it is not reported by the emulated arm \[s\].
+    /// Time of the event, unless the emulated arm reports it \[s\].
     event_s: Option<f64>,
 }
 
@@ -68,15 +68,15 @@ pub fn perform<const N: usize>(
     let (trace, reports) = (file("csv"), file("log"));
     let up = up_args(args, &prefix, &trace);
     let left = match case.runs_in_wall_clock_time() {
-        true => by_the_clock::<N>(case, &up, description, &domain, &reports),
-        false => in_virtual_time::<N>(case, up, description, &domain, &reports),
+        true => run_in_wall_clock_time::<N>(case, &up, description, &domain, &reports),
+        false => run_in_virtual_time::<N>(case, up, description, &domain, &reports),
     };
     let row = left.and_then(|left| {
-        let course = Course::read(&reports)?;
+        let course = ReportedCourse::read(&reports)?;
         let rows = trace::read(&trace)?;
         Ok(row::<N>(case, &left, &course, &rows))
     });
-    // The files belong to this test case only; reports of a case that could not be run state why.
+    // The files are removed, except the reports of a case that could not be run, which contain the reason.
     if let Err(failure) = &row {
         let reports = std::fs::read_to_string(&reports).unwrap_or_default();
         supple_cli::console::print_status(&format!("{case}: {failure}\n{}", reports.trim_end()));
@@ -87,9 +87,14 @@ pub fn perform<const N: usize>(
     row
 }
 
-fn row<const N: usize>(case: &Case, left: &Left, course: &Course, rows: &[TraceRow]) -> Row {
+fn row<const N: usize>(
+    case: &Case,
+    left: &RunOutput,
+    course: &ReportedCourse,
+    rows: &[TraceRow],
+) -> Row {
     let begun = match case.event {
-        // The host is lost with its last command.
+        // The loss of the host counts from its last command.
         Event::KillHost | Event::StopHost => {
             let mut commanded = course.watchdogs.iter();
             commanded
@@ -138,7 +143,7 @@ fn up_args(args: &DrillArgs, prefix: &str, trace: &Path) -> UpArgs {
     }
 }
 
-/// The move of the elbow.
+/// Returns the move of the elbow.
 fn moving<const N: usize>(description: &Description) -> Result<Request<N>, Failure> {
     let mut target_rad = description.home::<N>()?;
     target_rad[if N > 6 { 3 } else { 2.min(N - 1) }] += MOVE_RAD;
@@ -148,7 +153,7 @@ fn moving<const N: usize>(description: &Description) -> Result<Request<N>, Failu
     })
 }
 
-/// Requests of a task with their times from the start, and the time of the event \[s\].
+/// Returns the requests of a task with their times from the start, and the time of the event \[s\].
 fn script<const N: usize>(
     task: Task,
     description: &Description,
@@ -168,19 +173,19 @@ fn script<const N: usize>(
     })
 }
 
-fn in_virtual_time<const N: usize>(
+fn run_in_virtual_time<const N: usize>(
     case: &Case,
     mut up: UpArgs,
     description: &Description,
     domain: &Domain,
     reports: &Path,
-) -> Result<Left, Failure> {
+) -> Result<RunOutput, Failure> {
     let (mut requests, event_s) = script::<N>(case.task, description)?;
     if case.event == Event::Idle {
         requests.push((event_s, Request::Idle));
     }
     if let Event::Misbehaves { spec, .. } = &case.event {
-        // The arm counts from its motors being enabled, a few cycles after the start.
+        // The arm counts time from the enabling of its motors, a few cycles after the start.
         let at_s = START_S[0] + event_s;
         let with = if spec.contains(':') { ',' } else { ':' };
         up.misbehave.push(format!("{spec}{with}at-s={at_s:.4}"));
@@ -205,11 +210,11 @@ fn in_virtual_time<const N: usize>(
     if let Some(reason) = refusals.into_iter().next() {
         return Err(Failure::Refused { reason });
     }
-    let mut left = Left {
+    let mut left = RunOutput {
         samples: Vec::new(),
         event_s: None,
     };
-    let loses_arm = matches!(case.expected, Expected::TorqueGone { .. });
+    let loses_arm = matches!(case.expected, Expected::TorqueEnds { .. });
     let (begin, mut last_telemetry, mut killed) = (Instant::now(), Instant::now(), false);
     loop {
         let telemetry = system.poll_telemetry()?;
@@ -218,7 +223,7 @@ fn in_virtual_time<const N: usize>(
             left.samples.push(ControllerSample::of(telemetry));
             let cycle = telemetry.state.cycle;
             if case.event == Event::KillController {
-                // The last cycle that it has seen.
+                // The last cycle of the controller whose telemetry arrived.
                 left.event_s = Some(telemetry.state.stamp_ns as f64 * 1e-9);
                 if cycle >= event_cycle && !killed {
                     killed = true;
@@ -230,7 +235,7 @@ fn in_virtual_time<const N: usize>(
         }
         let silence = last_telemetry.elapsed();
         if telemetry.is_none() && loses_arm && left.event_s.is_some() && silence > SILENCE {
-            let without_torque = Course::read(reports)?.watchdogs.len();
+            let without_torque = ReportedCourse::read(reports)?.watchdogs.len();
             if without_torque == N || silence > LONG_SILENCE {
                 break;
             }
@@ -246,14 +251,14 @@ fn in_virtual_time<const N: usize>(
     Ok(left)
 }
 
-fn by_the_clock<const N: usize>(
+fn run_in_wall_clock_time<const N: usize>(
     case: &Case,
     up: &UpArgs,
     description: &Description,
     domain: &Domain,
     reports: &Path,
-) -> Result<Left, Failure> {
-    let mut left = Left {
+) -> Result<RunOutput, Failure> {
+    let mut left = RunOutput {
         samples: Vec::new(),
         event_s: None,
     };
@@ -267,13 +272,15 @@ fn by_the_clock<const N: usize>(
             telemetry.map_err(Failure::system)
         })?;
         left.event_s = Some(monotonic_ns() as f64 * 1e-9);
-        // Killed, and waited for.
+        // The process is killed and waited for.
         drop(running);
         let begin = Instant::now();
-        while begin.elapsed() < LAY_DOWN_TIMEOUT && Course::read(reports)?.disabled_s.is_empty() {
+        while begin.elapsed() < LAY_DOWN_TIMEOUT
+            && ReportedCourse::read(reports)?.disabled_s.is_empty()
+        {
             pause(Duration::from_millis(50));
         }
-        // The processes end by themselves.
+        // The processes end without a signal of this program.
         pause(Duration::from_millis(500));
         return Ok(left);
     }
@@ -299,7 +306,7 @@ fn by_the_clock<const N: usize>(
     Ok(left)
 }
 
-/// Brings a system that begins with tracking to its task.
+/// Brings a system that begins with tracking to the task of the test case.
 fn start_task<const N: usize>(
     task: Task,
     description: &Description,

@@ -7,7 +7,7 @@ use supple_model::Description;
 use supple_plant::{PlantConfig, PlantOptions};
 use supple_random::Random;
 
-/// What all cases of an arm have in common.
+/// Data that all cases of an arm share.
 pub(super) struct Arm<const N: usize> {
     pub(super) controller: Controller<N>,
     pub(super) ideal: PlantConfig<N>,
@@ -15,7 +15,7 @@ pub(super) struct Arm<const N: usize> {
 }
 
 impl<const N: usize> Arm<N> {
-    /// An arm and its simulations.
+    /// Creates the data of an arm.
     pub(super) fn new(description: &Description) -> Result<Arm<N>, ExperimentError> {
         let config = description.config::<N>()?;
         let controller = Controller::new(config)?;
@@ -32,7 +32,7 @@ impl<const N: usize> Arm<N> {
         self.controller.config()
     }
 
-    /// A pose within the soft stops; held joints are where they are held.
+    /// Draws a pose within the soft stops; held joints have their held angles.
     pub(super) fn pose(&self, random: &mut Random) -> Vector<N> {
         let config = self.config();
         let limits = &config.limits;
@@ -49,19 +49,19 @@ impl<const N: usize> Arm<N> {
         })
     }
 
-    /// Whether a motor turns this joint alone, so that a fault of its encoder is one of the joint.
+    /// Whether a motor moves only this joint, so that a fault of its encoder affects only this joint.
     pub(super) fn has_own_motor(&self, joint: usize) -> bool {
         let row = self.config().joint_from_motor.row(joint).into_owned();
         row.iter().filter(|ratio| **ratio != 0.0).count() == 1
     }
 }
 
-/// Uniform between two numbers.
+/// Draws a number from a uniform distribution between two numbers.
 pub(super) fn between(random: &mut Random, from: f64, to: f64) -> f64 {
     from + (to - from) * random.uniform()
 }
 
-/// One of some items.
+/// Draws one of the items.
 pub(super) fn pick<'a, T>(random: &mut Random, items: &'a [T]) -> &'a T {
     &items[random.index(items.len())]
 }

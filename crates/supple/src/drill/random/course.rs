@@ -9,37 +9,37 @@ use supple_core::{Input, State, Vector, step};
 use supple_experiment::ExperimentError;
 use supple_plant::{ControllerView, Injector, Plant};
 
-/// Time before the fault over which the motion counts as that of the task \[s\].
+/// Time before the fault in which the motion of the task is measured \[s\].
 const BEFORE_S: f64 = 0.2;
 /// Time after the stop from which the arm must be slow \[s\].
 const SLOW_AFTER_S: f64 = 0.5;
-/// Time after which energy that braking motors take no longer counts \[s\].
+/// Time after the start of braking until which an energy peak counts \[s\].
 const BRAKED_S: f64 = 0.01;
 
-/// What the arm did. "Stop" is the fault that the controller reports, or that the guard ends the torque, whichever is first.
+/// Outcome of a case. "Stop" is the first of two events: the controller reports a fault, or the guard ends the torque.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Course {
+pub(super) struct CaseOutcome {
     /// Time of the injected fault \[s\].
     pub(super) fault_s: Option<f64>,
-    /// Fault that the controller reports before the injected one, in words.
+    /// Fault that the controller reports before the injected fault, as text.
     pub(super) false_fault: Option<String>,
-    /// Time and words of the first one after it \[s\].
+    /// Time \[s\] and text of the first fault that the controller reports after it.
     pub(super) reported: Option<(f64, String)>,
     pub(super) stopped_s: Option<f64>,
     pub(super) braked_s: Option<f64>,
-    /// Peaks of the kinetic energy \[J\]: of the task; in the last time before the fault, with what a blow adds; from the fault to
-    /// the stop; at the stop; and after it until the motors brake.
+    /// Peak kinetic energies \[J\], here and in the following fields: during the task; shortly before the fault, including the
+    /// energy of a blow; from the fault to the stop; at the stop; and from the stop until the motors brake.
     pub(super) task_j: f64,
     pub(super) before_j: f64,
     pub(super) unstopped_j: f64,
     pub(super) stop_j: f64,
     pub(super) after_j: f64,
-    /// Greatest sum of kinetic, potential and elastic energy after the stop, less that at the stop \[J\].
+    /// Maximum increase of the sum of kinetic, potential and elastic energy after the stop \[J\].
     pub(super) gained_j: f64,
-    /// Greatest speed of the tip after the fault, and with active drives later than half a second after the stop \[m/s\].
+    /// Maximum tip speed after the fault, and later than half a second after the stop with active drives \[m/s\].
     pub(super) tip_m_per_s: f64,
     pub(super) late_m_per_s: f64,
-    /// Idle was requested and torque remained.
+    /// Whether torque remained after an idle request.
     pub(super) idle_refused: bool,
 }
 
@@ -47,12 +47,12 @@ pub(super) struct Course {
 struct Drives<const N: usize> {
     guard: DriveGuard<N>,
     active: bool,
-    /// The guard ended the torque; ends when the controller wants none.
+    /// Whether the guard has ended the torque, until the controller requests no torque.
     latched: bool,
 }
 
 impl<const N: usize> Drives<N> {
-    /// The torques that the motors get for a command \[N m\].
+    /// Returns the torques that the motors receive for a command \[N m\].
     fn torque_nm(
         &mut self,
         command: &DriveCommand<N>,
@@ -83,7 +83,10 @@ impl<const N: usize> Drives<N> {
 ///
 /// # Errors
 /// [`ExperimentError::Plant`] if the plant rejects the case.
-pub(super) fn run<const N: usize>(arm: &Arm<N>, case: &Case<N>) -> Result<Course, ExperimentError> {
+pub(super) fn run<const N: usize>(
+    arm: &Arm<N>,
+    case: &Case<N>,
+) -> Result<CaseOutcome, ExperimentError> {
     let (controller, config) = (&arm.controller, arm.config());
     let mut plant = Plant::new(case.plant.clone(), case.start_rad, Vector::zeros())?;
     let mut injector = Injector::new(&case.injections, &mut plant, config.period_s)?;
@@ -93,9 +96,9 @@ pub(super) fn run<const N: usize>(arm: &Arm<N>, case: &Case<N>) -> Result<Course
         active: false,
         latched: false,
     };
-    let mut course = Course::default();
+    let mut course = CaseOutcome::default();
     let mut requests = case.requests.iter().peekable();
-    let mut recent = Recent::new((BEFORE_S / config.period_s) as usize);
+    let mut recent = RecentEnergies::new((BEFORE_S / config.period_s) as usize);
     let mut stop_total_j = 0.0;
     for cycle in 0..(case.duration_s / config.period_s) as u64 {
         let time_s = cycle as f64 * config.period_s;
@@ -164,7 +167,7 @@ pub(super) fn run<const N: usize>(arm: &Arm<N>, case: &Case<N>) -> Result<Course
             }
         }
         if course.fault_s == Some(time_s) {
-            // A blow gives the arm its energy at once.
+            // A blow transfers its energy to the arm at once.
             course.before_j = course.before_j.max(kinetic_j);
         }
         recent.add(kinetic_j);
@@ -184,15 +187,15 @@ pub(super) fn run<const N: usize>(arm: &Arm<N>, case: &Case<N>) -> Result<Course
     Ok(course)
 }
 
-/// The kinetic energies of the last cycles.
-struct Recent {
+/// Kinetic energies of the last cycles.
+struct RecentEnergies {
     energies_j: Vec<f64>,
     next: usize,
 }
 
-impl Recent {
-    fn new(cycles: usize) -> Recent {
-        Recent {
+impl RecentEnergies {
+    fn new(cycles: usize) -> RecentEnergies {
+        RecentEnergies {
             energies_j: vec![0.0; cycles.max(1)],
             next: 0,
         }

@@ -1,4 +1,4 @@
-//! A random case: task, fault and time, all from one seed.
+//! Draws a random case from a seed: task, fault and time.
 
 use super::arm::{Arm, between, pick};
 use super::tasks::{self, Task};
@@ -7,7 +7,8 @@ use supple_core::controller::Request;
 use supple_plant::{Injection, InjectionKind, PlantConfig, Trigger};
 use supple_random::Random;
 
-/// Share of the cases in which the simulated arm has the effects of a real one, another request follows, and a second fault occurs.
+/// Fraction of the cases in which the simulated arm has the effects of a real arm, here and in the following constants: another
+/// request follows, and a second fault occurs.
 const REALISTIC_SHARE: f64 = 0.3;
 const HANDOVER_SHARE: f64 = 0.25;
 const SECOND_SHARE: f64 = 0.1;
@@ -22,18 +23,18 @@ const OBSERVED_S: f64 = 2.0;
 /// A random case.
 pub(super) struct Case<const N: usize> {
     pub(super) task: Task,
-    /// The request that replaces the task's, if any.
+    /// Name of the request that replaces the request of the task, if any.
     pub(super) handover: Option<&'static str>,
     pub(super) realistic: bool,
     pub(super) plant: PlantConfig<N>,
     pub(super) start_rad: Vector<N>,
-    /// With their times from the first cycle \[s\].
+    /// Requests, with their times from the first cycle \[s\].
     pub(super) requests: Vec<(f64, Request<N>)>,
     pub(super) injections: Vec<Injection>,
     pub(super) duration_s: f64,
 }
 
-/// The case of a seed; `None` if the arm cannot perform the task that was drawn.
+/// Draws the case of a seed; `None` if the arm cannot perform the drawn task.
 pub(super) fn case<const N: usize>(arm: &Arm<N>, seed: u64) -> Option<Case<N>> {
     let random = &mut Random::new(seed);
     let realistic = random.uniform() < REALISTIC_SHARE;
@@ -69,7 +70,7 @@ pub(super) fn case<const N: usize>(arm: &Arm<N>, seed: u64) -> Option<Case<N>> {
             let held_s = at_s + between(random, IDLE_S.0, IDLE_S.1);
             requests.push((held_s, Request::GravityHold));
         }
-        // Most often soon after it, when the torque is handed over.
+        // The fault is mostly soon after the request, during the handover of the torque.
         if random.uniform() < 0.7 {
             fault_s = at_s + between(random, -0.02, 0.25);
         }
@@ -104,12 +105,12 @@ pub(super) fn case<const N: usize>(arm: &Arm<N>, seed: u64) -> Option<Case<N>> {
     })
 }
 
-/// A fault of an encoder, a motor, a bus or the load.
+/// Draws a fault of an encoder, a motor, the bus or the load.
 fn fault<const N: usize>(arm: &Arm<N>, random: &mut Random) -> InjectionKind {
     use InjectionKind as Kind;
     let index = random.index(N);
     loop {
-        // Of all joints in a fifth of the draws.
+        // In a fifth of the draws, the fault affects all joints.
         let joint = random.index(N);
         let one = arm.has_own_motor(joint).then_some(joint);
         let (joint, of_some) = match random.uniform() < 0.2 {
@@ -156,13 +157,13 @@ fn fault<const N: usize>(arm: &Arm<N>, random: &mut Random) -> InjectionKind {
     }
 }
 
-/// A tenth of `most` to all of it, with either sign.
+/// Draws a number between a tenth of `most` and `most`, with either sign.
 fn signed(random: &mut Random, most: f64) -> f64 {
     let size = between(random, 0.1 * most, most);
     size * random.signed().signum()
 }
 
-/// The nearest multiple of `1 / round(1 / step)`, so that it is short in print.
+/// Rounds to the nearest multiple of `1 / round(1 / step)`, so that the printed number is short.
 fn rounded(value: f64, step: f64) -> f64 {
     let per_step = (1.0 / step).round();
     (value * per_step).round() / per_step

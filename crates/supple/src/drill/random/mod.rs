@@ -1,7 +1,7 @@
-//! `supple drill --random`: faults of random kinds at random times in random tasks and poses, judged by energy and speed alone.
+//! `supple drill --random`: faults of random kinds at random times in random tasks and poses, evaluated by energy and speed alone.
 //!
-//! The cases of [`super::matrix`] say what must happen in each; here nobody chose the case, and the rules ([`verdict`]) hold
-//! for all. Controller, drive guard and simulated arm run in one process, so that thousands of cases take minutes.
+//! Each case of [`super::matrix`] has its own expected result. The random cases share one set of rules ([`verdict`]) instead.
+//! Controller, drive guard and simulated arm run in one process, so that thousands of cases take minutes.
 
 mod arm;
 mod course;
@@ -22,15 +22,15 @@ use supple_cli::interrupt;
 use supple_experiment::ExperimentError;
 use supple_model::{Description, with_dof};
 
-/// Cases between two lines of progress.
+/// Number of cases between two lines of progress.
 const PROGRESS: u64 = 250;
-/// Seeds that the error names.
+/// Maximum number of seeds that the error lists.
 const NAMED_SEEDS: usize = 10;
 
 /// Runs `count` cases from the seed of the command line on.
 ///
 /// # Errors
-/// [`Failure::Drill`] if a case exceeds what is allowed; [`Failure::NoSuchTestCase`] for an arm whose drives do not brake.
+/// [`Failure::Drill`] if a case violates a rule; [`Failure::NoSuchTestCase`] for an arm whose drives do not brake.
 pub(super) fn run(args: &DrillArgs, description: &Description, count: u64) -> Result<(), Failure> {
     if description.falls_without_torque() {
         return Err(Failure::NoSuchTestCase {
@@ -68,7 +68,7 @@ pub(super) fn run(args: &DrillArgs, description: &Description, count: u64) -> Re
     })
 }
 
-/// Runs the cases on all processors; rows in the order of their seeds.
+/// Runs the cases on all processors; returns the rows in the order of their seeds.
 fn search<const N: usize>(
     args: &DrillArgs,
     description: &Description,

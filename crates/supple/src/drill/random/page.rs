@@ -1,8 +1,8 @@
 //! Results of random cases: by kind of fault, and the worst ones.
 
-use super::course::Course;
+use super::course::CaseOutcome;
 use super::draw::Case;
-use super::verdict::{Excess, excesses};
+use super::verdict::{Violation, excesses};
 use crate::cli::DrillArgs;
 use comfy_table::{ContentArrangement, Table, presets};
 use serde::Serialize;
@@ -10,13 +10,13 @@ use std::collections::BTreeMap;
 use std::fmt::Write;
 use supple_model::Description;
 
-/// Cases in the list of the worst.
+/// Number of cases in the list of the worst.
 const WORST: usize = 25;
 
 /// Result of a case.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Row {
-    /// Repeats the case: `supple drill --random 1 --seed SEED`.
+    /// Seed, with which `supple drill --random 1 --seed SEED` repeats the case.
     pub(super) seed: u64,
     task: String,
     realistic: bool,
@@ -25,11 +25,11 @@ pub(super) struct Row {
     faults: Vec<String>,
     #[serde(skip)]
     kind: &'static str,
-    /// What is not allowed.
-    pub(super) excesses: Vec<Excess>,
-    /// Fault that the controller reported, in words.
+    /// Violated rules.
+    pub(super) excesses: Vec<Violation>,
+    /// Fault that the controller reported, as text.
     reported: Option<String>,
-    /// From the injected fault \[ms\].
+    /// Time from the injected fault to the reported fault \[ms\].
     reported_after_ms: Option<f64>,
     stopped_after_ms: Option<f64>,
     braked_after_ms: Option<f64>,
@@ -42,7 +42,7 @@ pub(super) struct Row {
 }
 
 impl Row {
-    pub(super) fn new<const N: usize>(seed: u64, case: &Case<N>, course: &Course) -> Row {
+    pub(super) fn new<const N: usize>(seed: u64, case: &Case<N>, course: &CaseOutcome) -> Row {
         let after_ms = |at_s: Option<f64>| Some(((at_s? - course.fault_s?) * 1e3).round());
         let mut kinds = case.injections.iter().map(|of| of.kind.name());
         let kind = match (kinds.next(), kinds.next()) {
@@ -102,11 +102,11 @@ const WORST_TITLES: [&str; 8] = [
     "tip [m/s]",
 ];
 
-/// Cases of a kind of fault.
+/// Counts of the cases of one kind of fault.
 #[derive(Default)]
 struct Kind {
     cases: usize,
-    excesses: BTreeMap<Excess, usize>,
+    excesses: BTreeMap<Violation, usize>,
     peak_j: f64,
     tip_m_per_s: f64,
 }
@@ -127,7 +127,7 @@ fn kinds(rows: &[Row]) -> BTreeMap<&'static str, Kind> {
 
 fn kind_titles() -> Vec<String> {
     let mut titles = vec!["fault".to_owned(), "cases".to_owned()];
-    titles.extend(Excess::ALL.iter().map(ToString::to_string));
+    titles.extend(Violation::ALL.iter().map(ToString::to_string));
     titles.extend(["worst energy [J]".to_owned(), "worst tip [m/s]".to_owned()]);
     titles
 }
@@ -135,7 +135,7 @@ fn kind_titles() -> Vec<String> {
 fn kind_cells(name: &str, kind: &Kind) -> Vec<String> {
     let mut cells = vec![name.to_owned(), kind.cases.to_string()];
     let count = |excess| kind.excesses.get(excess).copied().unwrap_or(0).to_string();
-    cells.extend(Excess::ALL.iter().map(count));
+    cells.extend(Violation::ALL.iter().map(count));
     cells.push(format!("{:.2}", kind.peak_j));
     cells.push(format!("{:.2}", kind.tip_m_per_s));
     cells
@@ -207,7 +207,7 @@ operator does after the stop.
 
 ";
 
-/// The page.
+/// Formats the page.
 pub(super) fn page(rows: &[Row], args: &DrillArgs, description: &Description) -> String {
     let joints = match args.all_joints_active {
         true => ", all joints active",

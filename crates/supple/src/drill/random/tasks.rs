@@ -1,4 +1,4 @@
-//! Random tasks: each a start pose and the requests that start it.
+//! Draws random tasks; each has a start pose and the requests that start it.
 
 use super::arm::{Arm, between, pick};
 use core::fmt;
@@ -12,13 +12,13 @@ use supple_core::{Trajectory, Vector};
 use supple_experiment::{scenario, start_pose};
 use supple_random::Random;
 
-/// Draws of a motion until one is given up.
+/// Maximum number of attempts to draw a feasible motion.
 const DRAWS: u32 = 60;
-/// Longest point-to-point motion \[s\].
+/// Maximum duration of a point-to-point motion \[s\].
 const LONGEST_S: f64 = 8.0;
-/// Time between set-points, and how far each lies ahead \[s\].
+/// Time between set-points, and lead of each set-point \[s\].
 const SET_POINT_S: f64 = 0.04;
-/// Duration of the tasks that have one of their own \[s\].
+/// Duration of the tasks with a fixed duration \[s\].
 const TASK_S: f64 = 3.0;
 
 /// Task of a case.
@@ -52,7 +52,7 @@ impl fmt::Display for Task {
     }
 }
 
-/// A task with its start pose and its requests, with their times from its beginning \[s\].
+/// A task with its start pose, and its requests with times from the start of the task \[s\].
 pub(super) struct Plan<const N: usize> {
     pub(super) task: Task,
     pub(super) start_rad: Vector<N>,
@@ -92,7 +92,7 @@ pub(super) fn draw<const N: usize>(arm: &Arm<N>, random: &mut Random) -> Option<
     }
 }
 
-/// A motion between two poses, as fast as the limits allow or up to three times slower.
+/// Draws a motion between two poses, as fast as the limits allow or up to three times slower.
 fn point_to_point<const N: usize>(
     arm: &Arm<N>,
     random: &mut Random,
@@ -131,7 +131,8 @@ fn point_to_point<const N: usize>(
     None
 }
 
-/// A sinusoid anywhere in the workspace, or that of the paper faster or slower, at 5 N/m to the arm's highest stiffness.
+/// Draws a sinusoid anywhere in the workspace, or the sinusoid of the paper at another speed, at a stiffness from 5 N/m to the
+/// arm's maximum.
 fn track<const N: usize>(arm: &Arm<N>, random: &mut Random) -> Option<Plan<N>> {
     let config = arm.config();
     let highest = config.limits.stiffness_n_per_m;
@@ -168,7 +169,7 @@ fn track<const N: usize>(arm: &Arm<N>, random: &mut Random) -> Option<Plan<N>> {
     None
 }
 
-/// Oscillations of two joints.
+/// Draws oscillations of two joints.
 fn excite<const N: usize>(arm: &Arm<N>, random: &mut Random) -> Option<Plan<N>> {
     for _ in 0..DRAWS {
         let start_rad = arm.pose(random);
@@ -188,7 +189,7 @@ fn excite<const N: usize>(arm: &Arm<N>, random: &mut Random) -> Option<Plan<N>> 
     None
 }
 
-/// Points of the paper's sinusoid, streamed.
+/// Streams points of the paper's sinusoid as set-points.
 fn set_points<const N: usize>(arm: &Arm<N>, random: &mut Random) -> Option<Plan<N>> {
     let config = arm.config();
     let (sinusoid, _) = scenario::sinusoid(between(random, 0.5, 3.5));
@@ -204,7 +205,7 @@ fn set_points<const N: usize>(arm: &Arm<N>, random: &mut Random) -> Option<Plan<
             position_m: reference.position,
             velocity_m_per_s: reference.velocity,
             acceleration_m_per_s2: reference.acceleration,
-            // The loop that sends it adds its own cycle.
+            // The loop that sends the set-point adds the number of its own cycle.
             at_cycle: (SET_POINT_S / config.period_s) as u64,
         };
         (0.1 + at_s, Request::SetPoint(point))

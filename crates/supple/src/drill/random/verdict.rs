@@ -1,68 +1,69 @@
-//! What of a course is worse than allowed. No rule depends on the task or, but for a dead motor, on the fault. The bounds were
-//! written before the first search; after it, what a blow adds counts as motion before the fault, and idle by request is no stop.
+//! Rules for the outcome of a random case. No rule depends on the task or, except for a dead motor, on the fault. The bounds
+//! were written before the first search. Two rules were changed after it: the energy of a blow counts as motion before the
+//! fault, and a requested idle is no stop.
 
-use super::course::Course;
+use super::course::CaseOutcome;
 use super::draw::Case;
 use core::fmt;
 use serde::Serialize;
 use supple_plant::InjectionKind;
 
-/// Until the stop the kinetic energy may reach this multiple of the task's, or this many joules if that is more.
+/// Bound of the kinetic energy until the stop: this multiple of the energy of the task, or this energy \[J\] if it is higher.
 const UNSTOPPED: (f64, f64) = (3.0, 0.5);
-/// The same after the stop, of what it was at the stop or before the fault.
+/// Bound of the kinetic energy after the stop, as a multiple of the energy at the stop or before the fault, or in joules.
 const AFTER: (f64, f64) = (1.5, 0.12);
-/// Energy that an arm with a dead motor may gain after the stop, besides that of its fall \[J\].
+/// Energy that an arm with a dead motor may gain after the stop, in addition to the energy of its fall \[J\].
 const GAINED_J: f64 = 0.1;
-/// Speed of the tip with active drives later than half a second after the stop \[m/s\].
+/// Maximum tip speed with active drives later than half a second after the stop \[m/s\].
 const SLOW_M_PER_S: f64 = 0.25;
 
-/// Something that is not allowed.
+/// Violation of a rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub(super) enum Excess {
+pub(super) enum Violation {
     /// A fault is reported before one is injected.
     FalseFault,
-    /// The arm gathers energy, and nothing stops it within the time of the case.
+    /// The arm gains energy and is not stopped within the time of the case.
     Unstopped,
-    /// The arm gathers energy until it is stopped.
+    /// The arm gains too much energy before it is stopped.
     StoppedLate,
-    /// It gathers energy although it is being stopped.
+    /// The arm gains energy after the stop.
     GainsEnergy,
-    /// It still moves with active drives half a second later.
+    /// The arm still moves with active drives half a second after the stop.
     KeepsMoving,
-    /// Idle is requested, and torque remains.
+    /// Torque remains after an idle request.
     IdleRefused,
 }
 
-impl Excess {
-    /// All of them, in the order of the table.
-    pub(super) const ALL: [Excess; 6] = [
-        Excess::FalseFault,
-        Excess::Unstopped,
-        Excess::StoppedLate,
-        Excess::GainsEnergy,
-        Excess::KeepsMoving,
-        Excess::IdleRefused,
+impl Violation {
+    /// All violations, in the order of the table.
+    pub(super) const ALL: [Violation; 6] = [
+        Violation::FalseFault,
+        Violation::Unstopped,
+        Violation::StoppedLate,
+        Violation::GainsEnergy,
+        Violation::KeepsMoving,
+        Violation::IdleRefused,
     ];
 }
 
-impl fmt::Display for Excess {
+impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Excess::FalseFault => "false fault",
-            Excess::Unstopped => "not stopped",
-            Excess::StoppedLate => "stopped late",
-            Excess::GainsEnergy => "gains energy",
-            Excess::KeepsMoving => "keeps moving",
-            Excess::IdleRefused => "idle refused",
+            Violation::FalseFault => "false fault",
+            Violation::Unstopped => "not stopped",
+            Violation::StoppedLate => "stopped late",
+            Violation::GainsEnergy => "gains energy",
+            Violation::KeepsMoving => "keeps moving",
+            Violation::IdleRefused => "idle refused",
         })
     }
 }
 
-/// What of this course is not allowed.
-pub(super) fn excesses<const N: usize>(case: &Case<N>, course: &Course) -> Vec<Excess> {
+/// Returns the violations of a case.
+pub(super) fn excesses<const N: usize>(case: &Case<N>, course: &CaseOutcome) -> Vec<Violation> {
     if course.false_fault.is_some() {
-        return vec![Excess::FalseFault];
+        return vec![Violation::FalseFault];
     }
     let mut found = Vec::new();
     let is_dead = |kind| matches!(kind, InjectionKind::MotorDead { .. });
@@ -70,25 +71,25 @@ pub(super) fn excesses<const N: usize>(case: &Case<N>, course: &Course) -> Vec<E
     let (ratio, least_j) = UNSTOPPED;
     if course.unstopped_j > (ratio * course.task_j.max(course.before_j)).max(least_j) {
         found.push(match course.stopped_s {
-            None => Excess::Unstopped,
-            Some(_) => Excess::StoppedLate,
+            None => Violation::Unstopped,
+            Some(_) => Violation::StoppedLate,
         });
     }
     let (ratio, least_j) = AFTER;
     let allowed_j = (ratio * course.stop_j.max(course.before_j)).max(least_j);
-    // A joint without its motor falls: then its energy is that of the height that it loses.
+    // A joint without motor torque falls and gains the potential energy of its descent.
     let gains = match has_dead_motor {
         true => course.gained_j > GAINED_J,
         false => course.after_j > allowed_j,
     };
     if gains {
-        found.push(Excess::GainsEnergy);
+        found.push(Violation::GainsEnergy);
     }
     if course.late_m_per_s > SLOW_M_PER_S {
-        found.push(Excess::KeepsMoving);
+        found.push(Violation::KeepsMoving);
     }
     if course.idle_refused {
-        found.push(Excess::IdleRefused);
+        found.push(Violation::IdleRefused);
     }
     found
 }

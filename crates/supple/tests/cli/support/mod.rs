@@ -9,7 +9,7 @@ pub const PROGRAM: &str = match option_env!("CARGO_BIN_EXE_supple") {
     Some(operator) => operator,
     None => match option_env!("CARGO_BIN_EXE_supple-report") {
         Some(report) => report,
-        None => panic!("neither of the programs"),
+        None => panic!("neither supple nor supple-report is built"),
     },
 };
 
@@ -47,12 +47,12 @@ pub fn arg(path: &Path) -> &str {
     path.to_str().expect("a path of the tests is text")
 }
 
-/// Everything below a folder, relative to it, hidden files included.
+/// Lists all files below a folder, relative to it, including hidden files.
 pub fn tree(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut open = vec![folder.to_owned()];
     while let Some(next) = open.pop() {
-        for entry in std::fs::read_dir(&next).expect("the folder is there") {
+        for entry in std::fs::read_dir(&next).expect("the folder exists") {
             let path = entry.expect("the entry can be read").path();
             found.push(path.strip_prefix(folder).expect("below it").to_owned());
             if path.is_dir() {
@@ -90,9 +90,9 @@ pub fn run_in(folder: &Path, args: &[&str]) -> Answer {
     output.expect("it starts").into()
 }
 
-/// Makes a FIFO.
+/// Creates a FIFO.
 #[cfg(unix)]
 pub fn fifo(path: &Path) {
     let made = std::process::Command::new("mkfifo").arg(path).status();
-    assert!(made.expect("mkfifo is there").success());
+    assert!(made.expect("mkfifo exists").success());
 }

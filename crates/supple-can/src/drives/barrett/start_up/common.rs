@@ -1,13 +1,13 @@
-//! Functions that the start-up of the motors and that of the safety module use.
+//! Functions shared by the start-up of the motors and the start-up of the safety module.
 
 use crate::drives::barrett::error::CanError;
 use supple_puck::{Property, PropertyId, PropertyTable};
 
-/// Id of a property whose id is the same in every firmware version.
+/// Returns the id of a property that has the same id in every firmware version.
 pub(super) fn common_property_id(property: Property) -> Result<PropertyId, CanError> {
     PropertyTable::MONITOR
         .id(property)
-        .ok_or(CanError::Property {
+        .ok_or(CanError::UnsupportedProperty {
             node: 0,
             version: 0,
             property,

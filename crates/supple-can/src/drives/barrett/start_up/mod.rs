@@ -1,5 +1,5 @@
-//! Start-up: enumerates the nodes, identifies them, compares them with the description, and sets their
-//! encoder positions.
+//! Start-up of Barrett's drives: enumerates and identifies the nodes, compares them with the description, and sets the
+//! positions of the motor pucks.
 //!
 //! ```text
 //! safety module -> (operator: Shift-Idle) -> enumerate -> roles, versions -> wake -> motors idle
@@ -7,8 +7,8 @@
 //!   -> encoder positions from the home pose -> tare the sensor
 //! ```
 //!
-//! The host sets the motors to idle and never activates them: the operator does, at the pendant. Order and times
-//! follow libbarrett.
+//! The host sets the motors to idle. It never activates them: the operator activates them on the pendant. Order and
+//! times follow libbarrett.
 
 mod common;
 mod module;
@@ -22,17 +22,17 @@ use crate::drives::barrett::transmission::Transmission;
 pub use motors::{ARM_GROUPS, MotorPuck};
 use supple_bus::Bus;
 use supple_core::Vector;
-use supple_ipc::HomeFiles;
+use supple_ipc::HomePoseConfirmation;
 use supple_model::Description;
 use supple_puck::safety::{SafetyLimits, SafetyMode};
 use supple_puck::status::Stat;
 use supple_puck::{NodeId, Property, PropertyTable, Value, force_torque, property};
 
-/// Time after the wake-up in which the host sends nothing, because the pucks' transceivers leave the bus and return.
+/// Time after the wake-up in which the host sends nothing, because the pucks' transceivers restart \[ns\].
 const WAKE_QUIET_NS: u64 = 1_000 * MS;
-/// Time that taring the sensor takes, with a margin.
+/// Time that taring the sensor takes, with a margin \[ns\].
 const TARE_NS: u64 = 1_200 * MS;
-/// Poll interval of the module's mode while waiting for the operator.
+/// Poll interval of the safety module's mode while start-up waits for the operator \[ns\].
 const OPERATOR_POLL_NS: u64 = 100 * MS;
 /// Number of velocity faults that the safety module ignores after positions are redefined: more than the cycles of
 /// positions from which it computes the speed.
@@ -43,11 +43,12 @@ const IGNORED_FAULTS: i32 = 8;
 pub struct StartupConfig<const N: usize> {
     /// Current pose of the arm \[rad\]; `None` if unknown.
     pub zero_at_rad: Option<Vector<N>>,
-    /// Where the operator is asked to confirm the home pose if it is unknown; `None` makes that an error.
-    pub ask: Option<HomeFiles>,
+    /// Files through which start-up asks the operator to confirm the home pose if the current pose is unknown; with `None`
+    /// an unknown pose is an error.
+    pub ask: Option<HomePoseConfirmation>,
     /// Limits of the safety module.
     pub limits: SafetyLimits,
-    /// Tare the force/torque sensor, if there is one. If false, the sensor keeps its last tare.
+    /// Whether to tare the force/torque sensor, if the arm has one; otherwise the sensor keeps its last tare.
     pub tare: bool,
 }
 
@@ -114,7 +115,7 @@ pub fn start_up<const N: usize, B: Bus>(
     for node in (1..=N as u8).filter_map(NodeId::joint) {
         pucks.push(motors::identify(&mut host, node)?);
     }
-    motors::check_same_ids(&pucks)?;
+    motors::check_same_property_ids(&pucks)?;
     wake(&mut host, &pucks, &stats, progress)?;
 
     progress(Progress::Checking);
@@ -124,8 +125,8 @@ pub fn start_up<const N: usize, B: Bus>(
     }
     let mut scales = Vec::with_capacity(N);
     for (index, puck) in pucks.iter().enumerate() {
-        motors::configure(&mut host, puck, index)?;
-        scales.push(motors::check_and_limit(
+        motors::set_groups_and_slot(&mut host, puck, index)?;
+        scales.push(motors::check_and_set_torque_limit(
             &mut host,
             puck,
             index,
@@ -168,7 +169,8 @@ pub fn start_up<const N: usize, B: Bus>(
     })
 }
 
-/// Status ([`Property::STAT`]) by node number; `None` if the node does not answer.
+/// Requests the status ([`Property::STAT`]) of every node; returns it by node number, `None` for a node that does not
+/// answer.
 fn enumerate<B: Bus>(host: &mut Host<'_, B>) -> Result<[Option<i32>; 32], CanError> {
     let stat = common_property_id(Property::STAT)?;
     let mut stats = [None; 32];
@@ -231,19 +233,21 @@ fn wake<B: Bus>(
     Ok(())
 }
 
-/// Waits until the operator confirms that the arm is in its home pose. The module stays in idle meanwhile: if the power is lost once
-/// more, the arm sinks, and an answer is worth nothing.
+/// Waits until the operator confirms that the arm is in its home pose. If the safety module leaves idle meanwhile, the power
+/// was lost again and the arm has sunk: start-up then fails, and an answer of the operator is ignored.
 fn wait_for_home<const N: usize, B: Bus>(
     host: &mut Host<'_, B>,
     module: &PropertyTable,
     description: &Description,
-    files: &HomeFiles,
+    files: &HomePoseConfirmation,
 ) -> Result<Vector<N>, CanError> {
     let joints = description.joint_names().iter().zip(description.home_rad());
     let pose: Vec<String> = joints
         .map(|(name, angle_rad)| format!("{name} {angle_rad} rad"))
         .collect();
-    files.ask(&pose.join(", ")).map_err(CanError::Question)?;
+    files
+        .request(&pose.join(", "))
+        .map_err(CanError::HomePoseQuestion)?;
     loop {
         host.wait_silently(OPERATOR_POLL_NS)?;
         let answered = files.take_answer();
@@ -303,7 +307,7 @@ fn set_home_positions<const N: usize, B: Bus>(
         host.bus.send(&set_position)?;
         host.wait_silently(MS)?;
     }
-    // The safety module receives these replies as well, and with them the new positions.
+    // The safety module also receives these replies and takes the new positions from them.
     let replies = host.positions(pucks[0].position, N)?;
     for (puck, expected) in pucks.iter().zip(counts) {
         let node = puck.node.number();
@@ -313,7 +317,7 @@ fn set_home_positions<const N: usize, B: Bus>(
             node,
             remedy: "check its cable, then switch the arm off and on",
         })?;
-        // The arm may sag a little in the meantime; a puck that ignored the setting differs by far more.
+        // The arm may sag slightly before the reply; the position of a puck that ignored the setting differs far more.
         if (found - expected.get()).abs() > puck.counts_per_revolution / 8 {
             return Err(CanError::SettingIgnored {
                 property: Property::P,

@@ -32,36 +32,38 @@ pub fn find<B: Bus>(host: &mut Host<'_, B>) -> Result<PropertyTable, CanError> {
             expected: "a safety module (type 2 in the low five bits)",
         });
     }
-    PropertyTable::of_firmware(PuckKind::Safety, version).map_err(|source| CanError::Firmware {
-        node: node.number(),
-        source,
+    PropertyTable::of_firmware(PuckKind::Safety, version).map_err(|source| {
+        CanError::FirmwareTooOld {
+            node: node.number(),
+            source,
+        }
     })
 }
 
-/// Id of a property of the module.
+/// Returns the id of a property of the module.
 pub fn property_id(module: &PropertyTable, property: Property) -> Result<PropertyId, CanError> {
-    module.id(property).ok_or(CanError::Property {
+    module.id(property).ok_or(CanError::UnsupportedProperty {
         node: NodeId::SAFETY.number(),
         version: 0,
         property,
     })
 }
 
-/// The module's mode.
+/// Reads the mode of the module.
 pub fn mode<B: Bus>(
     host: &mut Host<'_, B>,
     module: &PropertyTable,
 ) -> Result<SafetyMode, CanError> {
     let id = property_id(module, Property::MODE)?;
     let found = motors::get_required(host, NodeId::SAFETY, id)?;
-    SafetyMode::from_value(found).map_err(|_| CanError::Value {
+    SafetyMode::from_value(found).map_err(|_| CanError::UnknownPropertyValue {
         property: Property::MODE,
         node: NodeId::SAFETY.number(),
         found,
     })
 }
 
-/// Switches an active module to idle.
+/// Switches the module to idle if it is active.
 pub fn set_idle<B: Bus>(host: &mut Host<'_, B>, module: &PropertyTable) -> Result<(), CanError> {
     let id = property_id(module, Property::MODE)?;
     let idle = i32::from(SafetyMode::Idle.value());
@@ -75,7 +77,7 @@ pub fn set_idle<B: Bus>(host: &mut Host<'_, B>, module: &PropertyTable) -> Resul
     }
 }
 
-/// Sets the limits and reads them back. The module resets them at power-up.
+/// Sets the limits of the module, which are reset at power-up, and reads them back.
 pub fn set_limits<B: Bus>(
     host: &mut Host<'_, B>,
     module: &PropertyTable,

@@ -1,4 +1,4 @@
-//! Motor pucks: identification, comparison with the description, and settings.
+//! The motor pucks during start-up: identification, comparison with the description, and settings.
 
 use super::common::common_property_id;
 use crate::drives::barrett::error::CanError;
@@ -10,14 +10,14 @@ use supple_puck::{
     GroupId, NodeId, PositionScale, Property, PropertyId, PropertyTable, PuckKind, TorqueScale,
 };
 
-/// Groups of the pucks of joints 1 to 4, and of 5 to 7, as in libbarrett and OWD.
+/// Groups of the pucks of joints 1 to 4, and of joints 5 to 7, as in libbarrett and OWD.
 pub const ARM_GROUPS: [[GroupId; 3]; 2] = [
     [GroupId::ACTUATORS, GroupId::LOWER_TORQUES, GroupId::ARM],
     [GroupId::ACTUATORS, GroupId::UPPER_TORQUES, GroupId::ARM],
 ];
-/// Number of requests to a node before it counts as missing. An emulated node may be delayed by its host.
+/// Number of requests to a node before it counts as missing. The machine may delay the answer of an emulated node.
 const ATTEMPTS: u32 = 4;
-/// Relative tolerance of a puck's torque units: the rounding of the torque quantum in the description.
+/// Relative tolerance of a puck's torque units, which allows for the rounding of the torque quantum in the description.
 const UNITS_TOLERANCE: f64 = 1e-3;
 
 /// An identified motor puck.
@@ -27,19 +27,19 @@ pub struct MotorPuck {
     pub node: NodeId,
     /// Firmware version.
     pub version: i32,
-    /// List of property ids.
+    /// Property ids of its firmware version.
     pub table: PropertyTable,
-    /// Id of the position.
+    /// Property id of the position.
     pub position: PropertyId,
-    /// Id of the torque.
+    /// Property id of the torque.
     pub torque: PropertyId,
-    /// Its replies also contain a joint encoder's position.
+    /// Whether its replies also contain the position of a joint encoder.
     pub joint_encoder: bool,
-    /// Encoder counts per revolution; set when start-up has compared the pucks, 4096 before.
+    /// Encoder counts per revolution: 4096 until start-up has read the value of the puck.
     pub counts_per_revolution: i32,
 }
 
-/// Rejects an arm with a missing or an additional motor puck.
+/// Rejects an arm on whose bus a motor puck is missing or additional.
 pub fn check_nodes(
     status_by_node: &[Option<i32>; 32],
     description: &Description,
@@ -68,7 +68,7 @@ pub fn check_nodes(
     Ok(())
 }
 
-/// Reads role and version, which a puck also reports before it is woken.
+/// Reads role and firmware version of a puck; a puck that has not been woken reports them too.
 pub fn identify<B: Bus>(host: &mut Host<'_, B>, node: NodeId) -> Result<MotorPuck, CanError> {
     let role = Role::from_value(get_required(
         host,
@@ -85,13 +85,13 @@ pub fn identify<B: Bus>(host: &mut Host<'_, B>, node: NodeId) -> Result<MotorPuc
     }
     let version = get_required(host, node, common_property_id(Property::VERS)?)?;
     let table = PropertyTable::of_firmware(PuckKind::Motor, version).map_err(|source| {
-        CanError::Firmware {
+        CanError::FirmwareTooOld {
             node: number,
             source,
         }
     })?;
     let property_id = |property| {
-        table.id(property).ok_or(CanError::Property {
+        table.id(property).ok_or(CanError::UnsupportedProperty {
             node: number,
             version,
             property,
@@ -108,8 +108,9 @@ pub fn identify<B: Bus>(host: &mut Host<'_, B>, node: NodeId) -> Result<MotorPuc
     })
 }
 
-/// Checks that all pucks use the same ids: a group frame has one torque id, and one request reads all positions.
-pub fn check_same_ids(pucks: &[MotorPuck]) -> Result<(), CanError> {
+/// Checks that all pucks use the same property ids for torque and position, because a torque frame and a position request
+/// to a group of pucks each contain one id.
+pub fn check_same_property_ids(pucks: &[MotorPuck]) -> Result<(), CanError> {
     for puck in pucks {
         let first = pucks[0];
         let pairs = [
@@ -130,13 +131,15 @@ pub fn check_same_ids(pucks: &[MotorPuck]) -> Result<(), CanError> {
     Ok(())
 }
 
-/// Id of a property of this puck.
+/// Returns the id of a property of this puck.
 pub fn property_id(puck: &MotorPuck, property: Property) -> Result<PropertyId, CanError> {
-    puck.table.id(property).ok_or(CanError::Property {
-        node: puck.node.number(),
-        version: puck.version,
-        property,
-    })
+    puck.table
+        .id(property)
+        .ok_or(CanError::UnsupportedProperty {
+            node: puck.node.number(),
+            version: puck.version,
+            property,
+        })
 }
 
 /// Reads a property of a node; fails if the node does not answer.
@@ -177,8 +180,8 @@ pub fn verify_setting<B: Bus>(
     })
 }
 
-/// Sets groups and slot of the puck at `index` if they differ.
-pub fn configure<B: Bus>(
+/// Sets the groups of the puck of joint `index` and its slot in the torque frame, unless they are already set.
+pub fn set_groups_and_slot<B: Bus>(
     host: &mut Host<'_, B>,
     puck: &MotorPuck,
     index: usize,
@@ -200,8 +203,8 @@ pub fn configure<B: Bus>(
 }
 
 /// Compares counts per revolution and torque units with the description, rejects a puck that is too hot, and sets its torque
-/// limit to the description's. Returns the scales of its counts and torque units.
-pub fn check_and_limit<B: Bus>(
+/// limit to the value in the description. Returns the scales of its position counts and torque units.
+pub fn check_and_set_torque_limit<B: Bus>(
     host: &mut Host<'_, B>,
     puck: &MotorPuck,
     index: usize,
@@ -217,7 +220,7 @@ pub fn check_and_limit<B: Bus>(
     let expected = motors.counts_per_revolution;
     let expected = expected.ok_or_else(|| missing_key("counts_per_revolution"))?;
     if i64::from(counts_per_revolution) != i64::from(expected) {
-        return Err(CanError::Contradiction {
+        return Err(CanError::DescriptionMismatch {
             property: Property::CTS,
             node,
             found: counts_per_revolution,
@@ -230,7 +233,7 @@ pub fn check_and_limit<B: Bus>(
     let quanta = quanta.ok_or_else(|| missing_key("torque_quantum_nm"))?;
     let expected = 1.0 / quanta[index];
     if (f64::from(units_per_nm) - expected).abs() > UNITS_TOLERANCE * expected {
-        return Err(CanError::Contradiction {
+        return Err(CanError::DescriptionMismatch {
             property: Property::IPNM,
             node,
             found: units_per_nm,
@@ -239,12 +242,12 @@ pub fn check_and_limit<B: Bus>(
         });
     }
     let position = PositionScale::new(counts_per_revolution)
-        .map_err(|source| CanError::Counts { node, source })?;
+        .map_err(|source| CanError::InvalidCountsPerRevolution { node, source })?;
     let torque = TorqueScale::new(f64::from(units_per_nm))
-        .map_err(|source| CanError::Units { node, source })?;
+        .map_err(|source| CanError::InvalidTorqueUnits { node, source })?;
     let max_torque = torque
         .puck_torque(motors.torque_nm[index])
-        .map_err(|source| CanError::Units { node, source })?;
+        .map_err(|source| CanError::InvalidTorqueUnits { node, source })?;
     let limit = property_id(puck, Property::MT)?;
     let max_units = i32::from(max_torque.units());
     if get_required(host, puck.node, limit)? != max_units {

@@ -1,6 +1,7 @@
-//! What must not keep an operator from being heard: requests that wait, a full disk, standard error that nobody reads.
+//! Conditions in which a request of an operator must still arrive: a full request queue, a full disk, standard error that is
+//! not read.
 
-use super::spec::Hindrance;
+use super::spec::RequestObstruction;
 use super::up_process::Up;
 use crate::cli::UpArgs;
 use crate::operate::OperatorSession;
@@ -20,12 +21,12 @@ use supple_ipc::message::Telemetry;
 
 /// Number of queued requests that fills the request queue.
 const QUEUE_CAPACITY: u64 = 16;
-/// Distance of the cycles of those requests from the current cycle.
+/// Distance of the cycles of the queued requests from the current cycle.
 const FAR_FUTURE_CYCLES: u64 = 1_000_000_000;
 /// Timeout for telemetry of a running system.
 const TELEMETRY_TIMEOUT: Duration = Duration::from_secs(20);
 
-/// Time from an idle request to its reply \[ms\], or the reason of a refusal.
+/// Requests idle; returns the time until its reply \[ms\], or the reason of a refusal.
 ///
 /// # Errors
 /// If the system is not running.
@@ -38,7 +39,7 @@ pub fn idle_after<const N: usize>(domain: &Domain) -> Result<Result<f64, String>
     }
 }
 
-/// The same while the request queue is full; `next` reads telemetry.
+/// Requests idle as [`idle_after`] does while the request queue is full; `next` reads telemetry.
 ///
 /// # Errors
 /// If the system is not running.
@@ -73,9 +74,9 @@ pub fn idle_past_a_full_queue<const N: usize>(
 
 /// An output of `supple up` that becomes full.
 pub enum FullOutput {
-    /// A log on a disk that takes no more: a limit of the file size, for this process alone.
+    /// A log on a full disk, simulated by a limit of the file size for this process.
     Log(PathBuf),
-    /// Standard error that nobody reads: a full pipe, with its end that is not read.
+    /// Standard error that is not read: a full pipe, with the side that is not read.
     StandardError {
         _unread: PipeReader,
         writer: PipeWriter,
@@ -87,9 +88,9 @@ impl FullOutput {
     ///
     /// # Errors
     /// [`Failure::System`] if the system refuses a pipe.
-    pub fn new(full: Hindrance, domain: &Domain) -> Result<FullOutput, Failure> {
+    pub fn new(full: RequestObstruction, domain: &Domain) -> Result<FullOutput, Failure> {
         match full {
-            Hindrance::StandardErrorFull => {
+            RequestObstruction::StandardErrorFull => {
                 let (_unread, writer) = std::io::pipe().map_err(Failure::system)?;
                 Ok(FullOutput::StandardError { _unread, writer })
             }
@@ -100,7 +101,7 @@ impl FullOutput {
         }
     }
 
-    /// Starts `supple up` with this output, which still takes data.
+    /// Starts `supple up` with this output, which still accepts data.
     ///
     /// # Errors
     /// [`Failure::File`], [`Failure::System`].
@@ -121,10 +122,10 @@ impl FullOutput {
         }
     }
 
-    /// Makes it full.
+    /// Makes the output full.
     ///
     /// # Errors
-    /// [`Failure::File`] without a log, [`Failure::System`].
+    /// [`Failure::File`] if the log is missing, [`Failure::System`] if the system refuses the limit.
     pub fn fill(&self, up: &Up) -> Result<(), Failure> {
         match self {
             FullOutput::Log(file) => {
@@ -151,8 +152,8 @@ impl FullOutput {
         Ok(())
     }
 
-    /// Whether the output has taken nothing since it was full, after the run has ended: the log could not be finished, the
-    /// pipe still takes no byte.
+    /// Whether the output accepted no data after it was full; call it after the run. The log is then incomplete, or the pipe still
+    /// accepts no byte.
     pub fn was_full(&self) -> bool {
         match self {
             FullOutput::Log(file) => part_of(file).exists() && !file.exists(),
@@ -163,7 +164,7 @@ impl FullOutput {
         }
     }
 
-    /// Removes what the run left.
+    /// Removes the files of the run.
     pub fn remove(self) {
         if let FullOutput::Log(file) = self {
             let _ = std::fs::remove_file(part_of(&file));

@@ -1,4 +1,4 @@
-//! What a command requests of a running system, and its reply.
+//! Requests of commands to a running system, and their replies.
 
 use super::session::OperatorSession;
 use crate::cli::{GainAxesName, GainsArgs, ModeArgs, SystemArgs, TrackArgs};
@@ -18,7 +18,7 @@ use supple_model::with_dof;
 /// Timeout for the first telemetry.
 pub(super) const TELEMETRY_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Reply to a request, as `--json` prints it.
+/// Reply to a request, in the form that `--json` prints.
 #[derive(Serialize)]
 pub(super) struct Answer {
     pub(super) accepted: bool,
@@ -43,10 +43,10 @@ pub(super) fn running(
     }
 }
 
-/// Time for which the compliant joints come to rest where they are \[s\].
+/// Duration of the move with which compliant joints stop at the present pose \[s\].
 pub(super) const COMPLY_S: f64 = 0.5;
 
-/// What a command requests of a running system, for an arm of any number of joints.
+/// Request of a command to a running system, for an arm with any number of joints.
 pub(super) enum SystemRequest<'a> {
     Idle,
     GravityHold,
@@ -75,7 +75,7 @@ impl SystemRequest<'_> {
             SystemRequest::Learning(switch) => Request::Learning(*switch),
             SystemRequest::JointImpedance(args) => match args.target.len() {
                 0 => Request::JointImpedance {
-                    target_rad: first(&now.position_rad),
+                    target_rad: first_joints(&now.position_rad),
                     duration_s: COMPLY_S,
                 },
                 found if found == N => Request::JointImpedance {
@@ -151,8 +151,8 @@ impl SystemRequest<'_> {
                 },
             },
             SystemRequest::JointGains(args) => {
-                let stiffness = first(&now.joint_stiffness_nm_per_rad);
-                let damping = first(&now.joint_damping_nm_s_per_rad);
+                let stiffness = first_joints(&now.joint_stiffness_nm_per_rad);
+                let damping = first_joints(&now.joint_damping_nm_s_per_rad);
                 Request::JointGains {
                     gains: JointGains {
                         stiffness_nm_per_rad: joints(
@@ -173,8 +173,8 @@ impl SystemRequest<'_> {
     }
 }
 
-/// The first `N` joints of a record.
-pub(super) fn first<const N: usize, const M: usize>(joints: &Vector<M>) -> Vector<N> {
+/// Returns the values of the first `N` joints of a record.
+pub(super) fn first_joints<const N: usize, const M: usize>(joints: &Vector<M>) -> Vector<N> {
     Vector::from_fn(|i, _| joints[i])
 }
 
@@ -186,7 +186,7 @@ pub(super) fn value_count(option: &'static str, found: usize, expected: String) 
     }
 }
 
-/// One value for all axes, or X,Y,Z; without any what is in force.
+/// Converts one value for all axes, or X,Y,Z; without values, returns the present gains.
 pub(super) fn axes(
     option: &'static str,
     given: &[f64],
@@ -200,7 +200,7 @@ pub(super) fn axes(
     }
 }
 
-/// A symmetric matrix of the pose mode: one value for all axes, X,Y,Z, or XX,YY,ZZ,YZ,ZX,XY.
+/// Converts values to a symmetric matrix of the pose mode: one value for all axes, X,Y,Z, or XX,YY,ZZ,YZ,ZX,XY.
 pub(super) fn matrix(option: &'static str, given: &[f64]) -> Result<Matrix3<f64>, Failure> {
     match *given {
         [all] => Ok(Matrix3::from_diagonal_element(all)),
@@ -213,7 +213,7 @@ pub(super) fn matrix(option: &'static str, given: &[f64]) -> Result<Matrix3<f64>
     }
 }
 
-/// One value for all joints, or one per joint; without any what is in force.
+/// Converts one value for all joints, or one per joint; without values, returns the present gains.
 pub(super) fn joints<const N: usize>(
     option: &'static str,
     given: &[f64],
@@ -231,7 +231,10 @@ pub(super) fn joints<const N: usize>(
     }
 }
 
-pub(super) fn ask(system: &SystemArgs, request: &SystemRequest<'_>) -> Result<(), Failure> {
+pub(super) fn send_and_print(
+    system: &SystemArgs,
+    request: &SystemRequest<'_>,
+) -> Result<(), Failure> {
     pub(super) fn send<const N: usize>(
         domain: &Domain,
         telemetry: &Telemetry,

@@ -1,10 +1,13 @@
-//! The joints that a command names.
+//! Joints that the user requests for a command.
 
 use supple_cli::exit::Failure;
 use supple_ident::IdentError;
 
-/// The requested joints, or all joints below `dof`.
-pub(super) fn joints(requested: &[usize], dof: usize) -> Result<Vec<usize>, Failure> {
+/// Checks the requested joint numbers; returns them, or all joints of an arm with `dof` joints if none are requested.
+///
+/// # Errors
+/// [`Failure::Ident`] unless the numbers are increasing and below `dof`.
+pub(super) fn requested_joints(requested: &[usize], dof: usize) -> Result<Vec<usize>, Failure> {
     if requested.is_empty() {
         return Ok((0..dof).collect());
     }
