@@ -1,7 +1,7 @@
 //! A bus of two nodes over Unix datagrams: the host and the emulated arm.
 //!
 //! Each datagram is a raw `struct can_frame` or `struct canfd_frame`: a data frame or an error frame. The
-//! bus has no bit rate; the arm's side may delay its frames. A frame counts as sent once the peer's socket has accepted it.
+//! sockets have no bit rate: the emulated arm itself delays its frames by the time that their bits take on a bus. A frame counts as sent once the peer's socket has accepted it.
 //! Without a peer, frames are not acknowledged, as on a real bus without an arm. No data leave the machine.
 
 use crate::bus::{Bus, BusFault, Event};
@@ -15,7 +15,8 @@ use std::collections::VecDeque;
 use supple_can_frame::CanFrame;
 use supple_realtime::monotonic_ns;
 
-/// Maximum number of unread confirmations; a transmit queue of the kernel has at least ten entries.
+/// Maximum number of unread confirmations. Beyond this number `send` returns `BusError::Full`, as a CAN interface does whose transmit
+/// queue is full; that queue has at least ten entries.
 const CONFIRMATIONS: usize = 64;
 
 /// A node of the bus.

@@ -9,6 +9,9 @@ use std::path::Path;
 use std::sync::Mutex;
 use supple_model::{Description, Paths, UrdfName, assets};
 
+/// The arm of a command or a process that is given none.
+pub const DEFAULT_ARM: &str = "wam4";
+
 /// Warnings that have been printed.
 static PRINTED_WARNINGS: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 

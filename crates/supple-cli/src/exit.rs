@@ -338,16 +338,16 @@ pub enum Failure {
     NothingTaught,
     /// The running system has another arm.
     #[error(
-        "the arm {arm} has {joints} joints, the arm of the running system has {running}: give that arm with --arm {named}"
+        "the arm {arm} has {joints}, the arm of the running system has {running}: give that arm with --arm {named}"
     )]
     OtherArm {
         /// Name of the given arm.
         arm: String,
-        /// Number of its joints.
-        joints: usize,
-        /// Number of joints of the running system.
-        running: usize,
-        /// Name of its arm, if it is known.
+        /// Its joints: their number, or their names if only these differ.
+        joints: String,
+        /// The joints of the arm of the running system.
+        running: String,
+        /// Name of the arm of the running system, if it is known.
         named: String,
     },
     /// A log cannot be read or written.

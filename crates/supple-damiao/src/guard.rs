@@ -158,7 +158,7 @@ impl MotorGuard {
             error => return Err(MotorFault::Error(error)),
         }
         self.celsius = feedback.hottest_celsius();
-        self.heat = self.thermal.heat(self.celsius);
+        self.heat = self.thermal.level(self.celsius);
         if self.heat == TemperatureLevel::Fault {
             let celsius = self.celsius;
             return Err(MotorFault::Hot { celsius });

@@ -41,7 +41,7 @@ impl TemperatureLimits {
     }
 
     /// Returns the level of `celsius`. A temperature of 0 means that the motor has not measured it yet, and is normal.
-    pub fn heat(&self, celsius: u8) -> TemperatureLevel {
+    pub fn level(&self, celsius: u8) -> TemperatureLevel {
         let celsius = f64::from(celsius);
         if celsius >= self.fault_celsius {
             TemperatureLevel::Fault

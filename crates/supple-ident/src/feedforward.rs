@@ -16,13 +16,13 @@ pub fn feedforward_nm<const N: usize>(config: &Config<N>, motion: &Motion) -> DM
     each_sample(config, motion, |_, whole| whole)
 }
 
-/// Returns the torques that compliance and learned terms add to those of links and friction along a motion, (samples, N)
+/// Returns the torques that compliance and learned terms add to those of rigid-body dynamics and friction along a motion, (samples, N)
 /// \[N m\].
 pub(crate) fn effects_nm<const N: usize>(config: &Config<N>, motion: &Motion) -> DMatrix<f64> {
     each_sample(config, motion, |plain, whole| whole - plain)
 }
 
-/// Returns `of(plain, whole)` for each sample: `plain` is the torque of links and friction at the encoders' angles, `whole` the
+/// Returns `of(plain, whole)` for each sample: `plain` is the torque of rigid-body dynamics and friction at the encoders' angles, `whole` the
 /// total feed-forward.
 fn each_sample<const N: usize>(
     config: &Config<N>,
@@ -54,10 +54,20 @@ fn each_sample<const N: usize>(
             &config.arm.gravity(),
             &q,
             &at_pose,
+            // Without acceleration of the tip: a learned payload counts with its weight, not with its inertia.
             &Vector3::zeros(),
         );
-        let change = learned.torque_nm(&config.learned, &config.friction, &qd, None, 1.0);
-        let whole = model + learned_torque_nm(&config.learned, &bounds, &model, &change);
+        // All of the dry friction, in the direction of the velocity.
+        let (dry_direction, dry_share) = (None, 1.0);
+        let unscaled_nm = learned.torque_nm(
+            &config.learned,
+            &config.friction,
+            &qd,
+            dry_direction,
+            dry_share,
+        );
+        // With the learned torque scales, and within the bounds.
+        let whole = model + learned_torque_nm(&config.learned, &bounds, &model, &unscaled_nm);
         let row = of(plain, whole);
         for joint in 0..N {
             torque_nm[(sample, joint)] = row[joint];

@@ -182,16 +182,17 @@ struct RecordDecoder {
     defaults: Vec<u64>,
 }
 
-/// Flags for the words of a record that a message definition contains.
+/// For each word of a record of this version: whether a message definition contains it.
 #[derive(Clone, Debug)]
 pub(crate) struct PresentWords(Vec<bool>);
 
 impl PresentWords {
-    /// Copies the words that the log does not contain from `logged` to `again`.
-    pub fn restore_absent(&self, logged: &[u64], again: &mut [u64]) {
-        let words = again.iter_mut().zip(logged).zip(&self.0);
-        for ((again, logged), _) in words.filter(|(_, present)| !**present) {
-            *again = *logged;
+    /// Copies each word that the log's definition lacks from the logged record, where it has its default, to the replayed one, so that
+    /// a comparison finds no difference there.
+    pub fn restore_absent(&self, logged: &[u64], replayed: &mut [u64]) {
+        let words = replayed.iter_mut().zip(logged).zip(&self.0);
+        for ((replayed, logged), _) in words.filter(|(_, present)| !**present) {
+            *replayed = *logged;
         }
     }
 }
@@ -330,7 +331,7 @@ impl ChannelDecoder {
         channel: &Channel,
         data: &[u8],
     ) -> Result<CycleRecord<N>, String> {
-        // Several channels of one name may have definitions of their own.
+        // Channels with the same topic may have different definitions: a decoder is used again only for an equal one.
         let known = self.0.as_ref().is_some_and(|(schema, _)| {
             Arc::ptr_eq(schema, &channel.schema) || *schema == channel.schema
         });

@@ -48,7 +48,7 @@ pub(crate) struct LogScanner {
     file: String,
     source: BufReader<File>,
     reader: LinearReader,
-    /// Bytes of complete records so far.
+    /// Length of the intact beginning of the file: magic and complete MCAP records \[bytes\].
     complete_bytes: u64,
     chunk: VecDeque<Record<'static>>,
     schemas: BTreeMap<u16, Arc<Schema>>,
@@ -83,12 +83,12 @@ impl LogScanner {
         })
     }
 
-    /// Returns the name of the file in messages.
+    /// Returns the path of the file, for the texts of errors.
     pub fn file(&self) -> &str {
         &self.file
     }
 
-    /// Bytes of complete records so far.
+    /// Length of the intact beginning of the file: magic and complete MCAP records \[bytes\].
     pub fn complete_bytes(&self) -> u64 {
         self.complete_bytes
     }
@@ -101,7 +101,7 @@ impl LogScanner {
     pub fn next(&mut self) -> Result<Option<LogItem>, LogError> {
         loop {
             while let Some(record) = self.chunk.pop_front() {
-                if let Some(item) = self.chunk_item(record)? {
+                if let Some(item) = self.data_item(record)? {
                     return Ok(Some(item));
                 }
             }
@@ -121,7 +121,7 @@ impl LogScanner {
                 }
                 Record::Chunk { .. } => return Ok(Some(LogItem::Chunk)),
                 record => {
-                    if let Some(item) = self.chunk_item(record)? {
+                    if let Some(item) = self.data_item(record)? {
                         return Ok(Some(item));
                     }
                 }
@@ -167,7 +167,7 @@ impl LogScanner {
         }
     }
 
-    fn chunk_item(&mut self, record: Record<'static>) -> Result<Option<LogItem>, LogError> {
+    fn data_item(&mut self, record: Record<'static>) -> Result<Option<LogItem>, LogError> {
         match record {
             Record::Schema { header, data } => {
                 let schema = Schema {

@@ -50,7 +50,9 @@ impl<'a> Values<'a> {
                 self.text.push_str(&text);
                 Ok(())
             }
-            Kind::Message(name) => return Err(format!("a list of {name} cannot be a table cell")),
+            Kind::Message(name) => {
+                return Err(format!("a bounded list of {name} cannot be a table cell"));
+            }
         };
         written.map_err(|error| error.to_string())?;
         Ok(&self.text)

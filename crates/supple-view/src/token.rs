@@ -43,11 +43,15 @@ mod tests {
 
     #[test]
     fn only_the_whole_token_matches_and_no_two_are_equal() {
-        let (token, other) = (Token::new().expect("random"), Token::new().expect("random"));
+        let (token, other) = (
+            Token::new().expect("random numbers of the kernel"),
+            Token::new().expect("random numbers of the kernel"),
+        );
         let text = token.as_str().to_owned();
         assert_eq!(text.len(), 2 * BYTES);
         assert!(token.matches(&text) && !other.matches(&text));
         for wrong in ["", &text[1..], &format!("{text}0"), &text.to_uppercase()] {
+            // A token without letters equals its upper-case form.
             assert!(
                 !token.matches(wrong) || *wrong == *text,
                 "{wrong} against {text}"

@@ -1,6 +1,7 @@
 """Checks of arguments: every error names the argument, the expected value and the given value.
 
-Of the wrong type is a TypeError, of the wrong value a ValueError. Neither text nor truth values are numbers.
+An argument of the wrong type raises a TypeError, one with a value out of range a ValueError. Neither text nor ``bool``
+counts as a number.
 """
 
 from __future__ import annotations
@@ -97,7 +98,10 @@ def named_numbers(name: str, values: Mapping[str, float]) -> dict[str, float]:
     """Returns finite numbers of either sign by their names."""
     if not isinstance(values, Mapping):
         raise wrong(name, "a mapping of names to numbers", values)
-    return {text(name, key): number(f"{name}[{key!r}]", value, signed=True) for key, value in values.items()}
+    return {
+        text(f"a name in {name}", key): number(f"{name}[{key!r}]", value, signed=True)
+        for key, value in values.items()
+    }
 
 
 def flag(name: str, value: bool) -> bool:

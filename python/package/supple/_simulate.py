@@ -51,8 +51,11 @@ class Run(Tabular):
     in_contact: NDArray[np.bool_]
     """Whether contact is latched, (cycles,)."""
     strokes: Mapping[str, Array]
-    """Probing only, by name, (strokes,) each: ``approach_m_per_s``, ``peak_filtered_n``,
-    ``contact_s``, ``impulse_newton_s``, ``rest_force_n``, ``pressing_force_n``, ``spring_force_n``."""
+    """Probing only, by name, (strokes,) each: ``approach_m_per_s`` (speed of the tip just before the first touch),
+    ``peak_filtered_n`` (maximum of the filtered vertical force in the first transient), ``contact_s`` (time in contact
+    until the next stroke, without the dwell), ``impulse_newton_s``, ``rest_force_n`` (mean vertical force over the last
+    0.3 s of the way down), ``pressing_force_n`` (mean vertical force over the last 0.5 s of the dwell),
+    ``spring_force_n`` (vertical force that the spring commands over that time)."""
     log: Path | None
     """Path of the log, if ``log_dir`` was given."""
 
@@ -91,7 +94,8 @@ def simulate(
     arm : Arm
         The arm, with its friction, limits and gains: :meth:`Arm.load` reads them.
     experiment : {"sinusoid", "arc", "quadrant", "probing"}
-        Figure 3a of the paper, an arc about the base, figure 3b, figures 5 and 6.
+        ``"sinusoid"``: figure 3a of the paper; ``"arc"``: an arc about the base; ``"quadrant"``: figure 3b; ``"probing"``:
+        figures 5 and 6.
     stiffness_n_per_m : float
         Stiffness of the tip on each axis (N/m), zero or more. The damping is proportional to its square
         root.
@@ -103,8 +107,8 @@ def simulate(
         The controller's model of the arm, such as :attr:`Fit.arm`: its inertias, friction, limits and
         gains. Default: the arm itself with the errors below.
     gravity_error, friction_error : float
-        Relative errors of the controller's model. Each parameter has the full error, with a sign drawn
-        from ``seed``. 1e-3 and 0.03 are typical of a good identification. Default 0: exact.
+        Relative errors of the controller's model: of each mass and each component of a centre of mass, and of each
+        friction parameter. Each is wrong by exactly this fraction, with a sign drawn from ``seed``. 1e-3 and 0.03 are typical of a good identification. Default 0: exact.
     stribeck : bool
         Whether the friction feed-forward includes the plant's Stribeck effect.
     load : bool

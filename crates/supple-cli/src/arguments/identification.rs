@@ -420,9 +420,10 @@ pub struct CalibrateArgs {
     /// Run without realtime priority, locked memory or processor binding.
     #[arg(long, requires = "on")]
     pub no_realtime: bool,
-    /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF: the simulated plant.
-    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
-    pub arm: String,
+    /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF: the simulated plant. Default: the arm of the
+    /// running system with `running`, else `wam4`.
+    #[arg(long, value_name = "NAME|PATH")]
+    pub arm: Option<String>,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,

@@ -4,13 +4,14 @@ use crate::console::{print_json, print_line};
 use crate::exit::Failure;
 use clap::Subcommand;
 use serde::Serialize;
+use std::collections::BTreeMap;
 use supple_plant::PlantOptions;
-use supple_plant::options::OPTIONS;
+use supple_plant::options::{OPTIONS, SETS};
 
 /// Command of `supple plant`.
 #[derive(Clone, Debug, Subcommand)]
 pub enum PlantCommand {
-    /// List all options of the simulated arm: unit, range, size in the set `realistic`, effect and source.
+    /// List all options of the simulated arm: unit, range, value in each built-in set, effect and source.
     List {
         /// Print the result as JSON.
         #[arg(long)]
@@ -30,7 +31,8 @@ struct Line {
     unit: &'static str,
     min: f64,
     max: f64,
-    realistic: Option<f64>,
+    /// Value in each set that has the option.
+    sets: BTreeMap<&'static str, f64>,
     effect: &'static str,
     source: &'static str,
 }
@@ -54,29 +56,36 @@ impl PlantCommand {
 }
 
 fn list(as_json: bool) -> Result<(), Failure> {
-    let realistic = PlantOptions::realistic();
-    let lines: Vec<Line> = OPTIONS
+    let mut lines: Vec<Line> = OPTIONS
         .iter()
-        .zip(realistic.values())
-        .map(|(option, (_, realistic))| Line {
+        .map(|option| Line {
             name: option.name,
             unit: option.unit,
             min: option.min,
             max: option.max,
-            realistic,
+            sets: BTreeMap::new(),
             effect: option.effect,
             source: option.source,
         })
         .collect();
+    for set in SETS {
+        let options = PlantOptions::from_toml(PlantOptions::set(set)?, set)?;
+        for (line, (_, value)) in lines.iter_mut().zip(options.values()) {
+            line.sets.extend(value.map(|value| (set, value)));
+        }
+    }
     if as_json {
         return print_json(&lines);
     }
     for (line, option) in lines.iter().zip(OPTIONS) {
-        let realistic = line
-            .realistic
-            .map_or("not set".to_owned(), |x| x.to_string());
+        let mut sets = line
+            .sets
+            .iter()
+            .map(|(set, value)| format!("{set}: {value}"));
+        let first = sets.next().unwrap_or_else(|| "in no set".to_owned());
+        let sets = sets.fold(first, |all, set| format!("{all}, {set}"));
         print_line(&format!(
-            "{}: {}; realistic: {realistic}\n    {}\n    source: {}",
+            "{}: {}\n    {sets}\n    {}\n    source: {}",
             line.name,
             option.range(),
             line.effect,

@@ -21,9 +21,10 @@ pub(super) enum Activity<const N: usize> {
     Excite(Fourier<N>),
     Breakaway {
         ramp: Breakaway,
-        /// Set-points of the other joints; for the ramped joint the angle from which its motion is measured.
+        /// Angles at which the position loops hold the other joints; for the ramped joint its angle at the start of the ramp \[rad\].
         from_rad: Vector<N>,
-        /// Torque of the ramped joint's position loop and friction when the mode was entered; the ramp is added to it \[N m\].
+        /// Torque of the position loop that held the ramped joint when the mode was entered, plus the constant part of its friction
+        /// feed-forward; 0 if no loop held it. The ramp is added to it \[N m\].
         held_nm: f64,
     },
     Float,
@@ -37,7 +38,7 @@ pub(super) enum Activity<const N: usize> {
         rotation: Rotation,
         /// Orientation of the tip when the mode was entered.
         from_base_from_tip: Matrix3<f64>,
-        /// Joint angles when the mode was entered \[rad\].
+        /// Joint angles when the mode was entered, towards which the posture stiffness pulls \[rad\].
         posture_rad: Vector<N>,
     },
     Fault(SafeAction),
@@ -60,7 +61,8 @@ impl<const N: usize> Activity<N> {
         }
     }
 
-    /// Returns whether this activity has a stiff position loop for every joint, held ones included.
+    /// Returns whether this activity itself moves or holds every joint, active or held, by a stiff position loop; `false` for gravity
+    /// hold, even with `hold_pose`.
     pub fn has_joint_loops(&self) -> bool {
         matches!(
             self,

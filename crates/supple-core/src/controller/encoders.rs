@@ -79,7 +79,7 @@ impl<const N: usize> Encoders<N> {
     }
 
     /// Returns angles or speeds of the encoders from those of the joints.
-    pub(super) fn from_joints(&self, joints: &Vector<N>) -> Vector<N> {
+    pub(super) fn values_of(&self, joints: &Vector<N>) -> Vector<N> {
         if self.coupled {
             self.from_joint * joints
         } else {
@@ -88,7 +88,7 @@ impl<const N: usize> Encoders<N> {
     }
 
     /// Returns the angle or speed of one encoder from those of the joints.
-    pub(super) fn from_joints_at(&self, encoder: usize, joints: &Vector<N>) -> f64 {
+    pub(super) fn value_at(&self, encoder: usize, joints: &Vector<N>) -> f64 {
         (self.from_joint.row(encoder) * joints)[0]
     }
 

@@ -127,7 +127,7 @@ impl<const N: usize> StuckEncoders<N> {
     #[inline(always)]
     pub fn receive(&mut self, encoders: &Encoders<N>, measured_rad: &Vector<N>) {
         self.measured_rad = *measured_rad;
-        let angle_rad = encoders.from_joints(measured_rad);
+        let angle_rad = encoders.values_of(measured_rad);
         let last_rad = core::mem::replace(&mut self.angle_rad, angle_rad);
         for encoder in 0..N {
             let change_rad = abs(angle_rad[encoder] - last_rad[encoder]);
@@ -282,7 +282,7 @@ impl<const N: usize> StuckEncoders<N> {
                 continue;
             }
             if self.unchanged_s[encoder] == 0.0 {
-                let speed_rad_per_s = encoders.from_joints_at(encoder, &last_rad_per_s);
+                let speed_rad_per_s = encoders.value_at(encoder, &last_rad_per_s);
                 self.speed_rad_per_s[encoder] = abs(speed_rad_per_s);
             }
             self.unchanged_s[encoder] += elapsed_s;
@@ -409,7 +409,7 @@ impl<const N: usize> StuckEncoders<N> {
         if !self.any_unchanged() {
             return Ok(());
         }
-        let reference_rad_per_s = encoders.from_joints(reference_rad_per_s);
+        let reference_rad_per_s = encoders.values_of(reference_rad_per_s);
         for encoder in 0..N {
             if !self.unchanged[encoder] {
                 continue;

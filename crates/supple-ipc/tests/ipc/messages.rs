@@ -10,13 +10,16 @@ use supple_ipc::message::*;
 
 #[test]
 fn messages_have_no_padding() {
-    let joints = MAX_DOF * 8;
+    let joint_array_bytes = MAX_DOF * size_of::<f64>();
     assert_eq!(size_of::<PlantReport>(), 9 * 8);
     assert_eq!(
         size_of::<ArmState>(),
-        3 * 8 + joints + 3 * 8 + size_of::<PlantReport>() + 8
+        3 * 8 + joint_array_bytes + 3 * 8 + size_of::<PlantReport>() + 8
     );
-    assert_eq!(size_of::<TorqueCommand>(), 2 * 8 + 2 * joints + 8);
+    assert_eq!(
+        size_of::<TorqueCommand>(),
+        2 * 8 + 2 * joint_array_bytes + 8
+    );
     assert_eq!(size_of::<Text>(), 256);
     assert_eq!(size_of::<OperatorRequest>(), 3 * 8 + 80 * 8 + 8);
     assert_eq!(size_of::<OperatorReply>(), 3 * 8 + size_of::<Text>() + 8);
@@ -77,12 +80,12 @@ fn messages_for_another_arm_are_refused_with_both_joint_counts() {
 
 #[test]
 fn command_carries_torques_mode_and_requested_drive_state() {
-    let hold = |request, shutting_down| {
+    let command_after = |request, shutting_down| {
         let input = support::state(7).input::<4>(request).expect("four joints");
         let output = support::answer(&input);
         (output, TorqueCommand::new(&output, shutting_down))
     };
-    let (output, command) = hold(Some(Request::GravityHold), false);
+    let (output, command) = command_after(Some(Request::GravityHold), false);
     assert_eq!(command.cycle, 7);
     assert_eq!(command.torque::<4>(), Ok(output.torque_nm));
     assert_eq!(
@@ -91,8 +94,12 @@ fn command_carries_torques_mode_and_requested_drive_state() {
     );
     assert_eq!(command.mode(), Some(Mode::GravityHold));
     assert!(command.wants_torque());
-    assert!(!hold(Some(Request::GravityHold), true).1.wants_torque());
-    let (_, idle) = hold(None, false);
+    assert!(
+        !command_after(Some(Request::GravityHold), true)
+            .1
+            .wants_torque()
+    );
+    let (_, idle) = command_after(None, false);
     assert!(!idle.wants_torque());
     assert_eq!(idle.torque::<4>(), Ok(Vector::zeros()));
 }

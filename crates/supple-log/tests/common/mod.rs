@@ -1,7 +1,7 @@
 //! A sample run for the log tests: a controller moves the four-joint arm, simulated without friction, through several modes, with
 //! accepted and refused requests, a lost encoder reply and a fault.
 
-#![allow(dead_code, reason = "each test uses its part")]
+#![allow(dead_code, reason = "each test program uses only some of these items")]
 
 use std::path::Path;
 use supple_core::config::Gains;
@@ -122,6 +122,7 @@ fn request(k: u64, home: &Vector<N>, tip: Vector3<f64>) -> Option<Request<N>> {
             ramp_s: 0.1,
         }),
         1_200 => Some(Request::Track(Trajectory::Probe(Probe {
+            // Beyond the reach of the arm: the controller refuses this request.
             radius_m: 30.0,
             strokes: 3,
             radial_step_m: 0.01,

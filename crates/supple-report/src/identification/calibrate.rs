@@ -5,7 +5,7 @@ use super::report::{ReportInput, summary};
 use crate::demo;
 use serde::Serialize;
 use supple_cli::arguments::{CalibrateArgs, DemoArgs, PlantArgs};
-use supple_cli::arms;
+use supple_cli::arms::{self, DEFAULT_ARM};
 use supple_cli::console::{json, print_line, print_status};
 use supple_cli::exit::Failure;
 use supple_cli::out::Staging;
@@ -49,7 +49,8 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
     if args.on.is_some() {
         return Err(Failure::NeedsSupple { option: "--plant" });
     }
-    let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
+    let name = args.arm.as_deref().unwrap_or(DEFAULT_ARM);
+    let arm = arms::find(&args.urdf.name(name), args.strict)?;
     with_dof!(arm.dof(), N => run_with_dof::<N>(&arm, args))??;
     if args.no_demo {
         return Ok(());
@@ -65,7 +66,7 @@ pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
         urdf: args.urdf.clone(),
         arm: match args.ripple > 0.0 {
             true => plant.display().to_string(),
-            false => args.arm.clone(),
+            false => name.to_owned(),
         },
         strict: args.strict,
         model: Some(args.out.clone()),

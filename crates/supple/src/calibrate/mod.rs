@@ -7,13 +7,14 @@ mod running_arm;
 mod terminal;
 
 use crate::cli::{PlantKind, UpArgs, UpTrajectory};
+use crate::operate::arm_of;
 use crate::up::Pidfile;
 use running_arm::RunningArm;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use supple_bus::Address;
 use supple_cli::arguments::{CalibrateArgs, CalibrationPlant, PlantArgs, UrdfArgs};
-use supple_cli::arms;
+use supple_cli::arms::{self, DEFAULT_ARM};
 use supple_cli::console::{print_status, write_stderr_in_background};
 use supple_cli::exit::Failure;
 use supple_cli::interrupt;
@@ -37,13 +38,20 @@ const PLANT_OPTIONS: &str = "plant.toml";
 /// # Errors
 /// [`Failure`]; the results of finished steps are kept, see `--resume`.
 pub fn run(args: &CalibrateArgs, on: CalibrationPlant) -> Result<(), Failure> {
-    let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
-    let found = with_dof!(arm.dof(), N => sized::<N>(&arm, args, on))??;
+    let domain = Domain::new(args.prefix.as_deref()).map_err(Failure::system)?;
+    let name = match on {
+        CalibrationPlant::Running => arm_of(&domain, args.arm.as_deref(), &args.urdf),
+        _ => args.urdf.name(args.arm.as_deref().unwrap_or(DEFAULT_ARM)),
+    };
+    let arm = arms::find(&name, args.strict)?;
+    let found = with_dof!(arm.dof(), N => sized::<N>(&arm, &name, &domain, args, on))??;
     report::print(&found, &args.out, args.json)
 }
 
 fn sized<const N: usize>(
     arm: &Description,
+    name: &str,
+    domain: &Domain,
     args: &CalibrateArgs,
     on: CalibrationPlant,
 ) -> Result<CalibratedArm, Failure> {
@@ -74,18 +82,17 @@ fn sized<const N: usize>(
         let mut arm = InProcessArm::new(plant, arm.home::<N>()?, logs, notes);
         return Ok(calibrate_arm(&mut arm, &start, &options, &mut terminal)?);
     }
-    let domain = Domain::new(args.prefix.as_deref()).map_err(Failure::system)?;
     write_stderr_in_background();
     let stop = interrupt::shutdown_on_interrupt();
     if args.virtual_time && on != CalibrationPlant::Emu {
         return Err(Failure::VirtualTimeNeedsEmu);
     }
-    let up = up_args(arm, args, on)?;
+    let up = up_args(arm, name, args, on)?;
     let starts = on != CalibrationPlant::Running;
     let _pidfile = starts
-        .then(|| Pidfile::create(&domain, &up.arm))
+        .then(|| Pidfile::create(domain, &up.arm))
         .transpose()?;
-    let mut running = RunningArm::<N>::new(&up, starts, arm, &domain, &args.out, stop)?;
+    let mut running = RunningArm::<N>::new(&up, starts, arm, domain, &args.out, stop)?;
     let result = calibrate_arm(&mut running, &start, &options, &mut terminal);
     let ended = running.end();
     if result.is_err() {
@@ -166,6 +173,7 @@ fn start_model<const N: usize>(
 /// Returns the arguments of the system to start. The emulated arm draws the signs and phases of its effects from the seed.
 fn up_args(
     arm: &Description,
+    name: &str,
     args: &CalibrateArgs,
     on: CalibrationPlant,
 ) -> Result<UpArgs, Failure> {
@@ -176,7 +184,7 @@ fn up_args(
             CalibrationPlant::Can => PlantKind::Can,
             _ => PlantKind::Sim,
         },
-        arm: arms::absolute(&args.urdf.name(&args.arm)),
+        arm: arms::absolute(name),
         urdf: UrdfArgs::default(),
         strict: args.strict,
         track: UpTrajectory::Sinusoid,

@@ -36,14 +36,11 @@ use test_arms::{TestArm, TestArms};
 use crate::cli::{DrillArgs, PlantKind};
 use row::Row;
 use spec::Spec;
-use supple_cli::arms;
+use supple_cli::arms::{self, DEFAULT_ARM};
 use supple_cli::console::{print_json, print_line, print_status};
 use supple_cli::exit::Failure;
 use supple_cli::interrupt;
 use supple_model::with_dof;
-
-/// Default arm of the command line.
-const DEFAULT_ARM: &str = "wam4";
 
 /// Runs `supple drill`.
 ///

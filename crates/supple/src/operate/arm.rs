@@ -3,13 +3,11 @@
 use crate::cli::SystemArgs;
 use crate::up::running_arm;
 use supple_cli::arguments::UrdfArgs;
+use supple_cli::arms::DEFAULT_ARM;
 use supple_cli::exit::Failure;
 use supple_ipc::Domain;
 use supple_ipc::message::Telemetry;
 use supple_model::Description;
-
-/// Arm of a system that was not started by `supple up`: the default of its processes.
-const DEFAULT_ARM: &str = "wam4";
 
 /// Returns the arm for a command to a running system: the given arm, or the arm of its `supple up`.
 pub fn arm_of(domain: &Domain, given: Option<&str>, urdf: &UrdfArgs) -> String {
@@ -30,24 +28,35 @@ pub(super) fn arm_of_system(
     Ok(arm_of(&domain, given, urdf))
 }
 
-/// Whether the arm can be that of the running system.
+/// Checks that the arm can be the arm of the running system: both have the same number of joints, and joints of the same names if
+/// the arm of the system is known.
 ///
 /// # Errors
-/// [`Failure::OtherArm`] with the name of its arm, if it is known.
+/// [`Failure::OtherArm`] with the name of the arm of the running system, if it is known.
 pub(super) fn check_arm(
     domain: &Domain,
     arm: &str,
     description: &Description,
     telemetry: &Telemetry,
 ) -> Result<(), Failure> {
-    let running = usize::from(telemetry.state.dof);
-    if running == description.dof() {
-        return Ok(());
-    }
-    Err(Failure::OtherArm {
+    let named = running_arm(domain);
+    let joints = usize::from(telemetry.state.dof);
+    let differs = |joints: String, running: String| Failure::OtherArm {
         arm: arm.to_owned(),
-        joints: description.dof(),
+        joints,
         running,
-        named: running_arm(domain).unwrap_or_else(|| "NAME".to_owned()),
-    })
+        named: named.clone().unwrap_or_else(|| "NAME".to_owned()),
+    };
+    if joints != description.dof() {
+        let count = |joints: usize| format!("{joints} joints");
+        return Err(differs(count(description.dof()), count(joints)));
+    }
+    let running = named.as_deref().map(Description::find);
+    match running {
+        Some(Ok(running)) if running.joint_names() != description.joint_names() => {
+            let names = |of: &Description| format!("the joints {}", of.joint_names().join(", "));
+            Err(differs(names(description), names(&running)))
+        }
+        _ => Ok(()),
+    }
 }

@@ -113,7 +113,7 @@ mod tests {
                 "run.mcap.part",
             ] {
                 let words = message(Some(&log), &at(trace));
-                for part in ["--trace", "--log", "two names"] {
+                for part in ["--trace", "--log", "different names"] {
                     assert!(words.contains(part), "{words}");
                 }
             }

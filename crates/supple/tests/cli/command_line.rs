@@ -121,6 +121,19 @@ fn plant_options_are_listed_and_a_set_is_shown_as_a_file() {
         assert!(list.stdout.contains(option.name), "{}", option.name);
     }
     assert_eq!(options.as_array().expect("a list").len(), OPTIONS.len());
+    let sets = PlantOptions::realistic();
+    for ((_, value), line) in sets.values().zip(options.as_array().expect("a list")) {
+        assert_eq!(line["sets"]["realistic"].as_f64(), value, "{line}");
+        assert!(
+            line["sets"].as_object().is_some_and(|sets| sets.len() <= 3),
+            "{line}"
+        );
+    }
+    assert!(
+        list.stdout.contains("openarm-realistic: "),
+        "{}",
+        list.stdout
+    );
     let shown = run(&["plant", "show", "realistic"]);
     let found = PlantOptions::from_toml(&shown.stdout, "shown").expect("a file of options");
     assert_eq!(found, PlantOptions::realistic());

@@ -100,7 +100,8 @@ impl<B: Bus> Host<'_, B> {
         Ok(positions)
     }
 
-    /// Returns the next frame of another node. A missing acknowledgement is no error: it is normal during enumeration.
+    /// Returns the next frame that a node sent, not this host. Ignores all bus faults except bus-off: without a powered node, no
+    /// node acknowledges the requests with which the start-up searches for nodes.
     fn next(&mut self, until_ns: u64) -> Result<Option<CanFrame>, CanError> {
         loop {
             match self.bus.receive_until(until_ns)? {

@@ -6,7 +6,7 @@
 //! ```
 //!
 //! Start-up stores nothing in flash and sets no zero position. A motor whose watchdog has tripped reports lost communication
-//! until the error is cleared. Start-up clears this error and no other, also when it is repeated after the arm was lost; the
+//! until the error is cleared. Start-up clears this error and no other, also when it is repeated after the arm has lost its power; the
 //! motor stays disabled.
 
 use super::error::DamiaoError;
@@ -22,7 +22,7 @@ use supple_damiao::temperature::TemperatureLimits;
 use supple_damiao::{Feedback, SpecialCommand, Status};
 use supple_model::{BusDescription, BusFormat, BusMotor, Description};
 
-/// Time before the first request in which replies to an earlier host are discarded \[ns\].
+/// Time before the first request in which replies to requests of an earlier process are discarded \[ns\].
 const QUIET_NS: u64 = 5 * MS;
 /// Maximum angle by which a joint may exceed its limits at start-up, because it may rest on its hard stop \[rad\].
 const SLACK_RAD: f64 = 0.1;
@@ -62,6 +62,7 @@ pub fn start_up<const N: usize, B: Bus>(
         bus_description.derating_celsius,
         bus_description.fault_celsius,
     );
+    // The description has already checked that these ascend.
     let thermal = thermal.ok_or_else(no_motors)?;
     let mut host = Host { bus, format, stop };
     host.discard(QUIET_NS)?;

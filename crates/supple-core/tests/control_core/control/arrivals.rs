@@ -10,7 +10,7 @@ fn rotating() -> (Rig<4>, Vector<4>) {
     rotating_with(four().plausible.lost_replies)
 }
 
-/// The same with `lost_replies` tolerated.
+/// The same, with a budget of `lost_replies` per joint: a lost reply uses one, eight received replies restore one.
 fn rotating_with(lost_replies: u32) -> (Rig<4>, Vector<4>) {
     let speed = Vector::<4>::new(0.3, 0.2, 0.0, -0.4);
     let mut config = four();
@@ -42,7 +42,10 @@ fn a_single_lost_reply_is_extrapolated() {
         let output = rig.step(&without(&rig, lost));
         assert_eq!((output.fault, output.mode), (None, Mode::GravityHold));
         let error = output.position_rad - rig.q;
-        assert!(error.norm() < 1e-9, "coasted {error} away");
+        assert!(
+            error.norm() < 1e-9,
+            "the extrapolated angles differ by {error} rad"
+        );
         assert!((output.velocity_rad_per_s - speed).norm() < 1e-6);
         // The fallback is gravity at the last completely measured pose.
         assert_eq!(output.fallback_torque_nm, trusted);
@@ -160,7 +163,7 @@ fn missing_states_are_tolerated_as_long_as_repeated_ones() {
 }
 
 #[test]
-fn a_lower_cycle_number_faults_and_becomes_the_new_reference() {
+fn a_lower_cycle_number_faults_and_later_numbers_count_from_it() {
     let mut rig = Rig::holding(four(), bent());
     let last = rig.cycle - 1;
     let received = last - 7;
