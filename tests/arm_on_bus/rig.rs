@@ -3,7 +3,7 @@
 use crate::link::InProcessLink;
 use supple_bus::FaultInjector;
 use supple_bus::virtual_time::{DirectBus, EmulatedNodes};
-use supple_can::{CanError, Cycle, Ready, StartupConfig, start_up};
+use supple_can::{BarrettLoop, CanError, Ready, StartupConfig, start_up};
 use supple_core::controller::Request;
 use supple_core::{Controller, Vector};
 use supple_drive::{Action, CycleConfig, Stage};
@@ -40,7 +40,7 @@ fn seeded_bus<const N: usize>(emulator: Emulator<N>, seed: u64) -> TestBus<N> {
 pub fn startup_config<const N: usize>() -> StartupConfig<N> {
     StartupConfig {
         zero_at_rad: Some(description(N).home::<N>().unwrap()),
-        ask: None,
+        confirmation: None,
         limits: SafetyLimits {
             speed_fault: SpeedLimit::from_m_per_s(2.0).ok(),
             ..SafetyLimits::default()
@@ -57,7 +57,7 @@ pub fn try_start<const N: usize>(
 }
 
 pub struct Rig<const N: usize> {
-    pub cycle: Cycle<N, TestBus<N>, InProcessLink<N>>,
+    pub cycle: BarrettLoop<N, TestBus<N>, InProcessLink<N>>,
     /// Torque of each motor at the end of every cycle \[N m\], with the bus time \[ns\].
     pub history: Vec<(u64, Vector<N>)>,
 }
@@ -84,7 +84,7 @@ impl<const N: usize> Rig<N> {
         let mut bus = seeded_bus(emulator, seed);
         let startup_config = StartupConfig {
             zero_at_rad: Some(pose),
-            ask: None,
+            confirmation: None,
             ..startup_config()
         };
         let ready = try_start(&mut bus, &startup_config).unwrap();
@@ -95,7 +95,7 @@ impl<const N: usize> Rig<N> {
             period_ns,
             answer_ns: ANSWER_NS,
         };
-        let cycle = supple_can::cycle(bus, link, ready, &config, cycle_config).unwrap();
+        let cycle = supple_can::new_plant_loop(bus, link, ready, &config, cycle_config).unwrap();
         Rig {
             cycle,
             history: Vec::new(),

@@ -130,7 +130,7 @@ fn a_second_start_accepts_an_arm_that_is_awake_and_has_its_position_reference() 
     let mut bus = rig::bus(emulator);
     let startup_config = StartupConfig {
         zero_at_rad: None,
-        ask: None,
+        confirmation: None,
         ..startup_config::<4>()
     };
     let begun_ns = bus.now_ns();
@@ -144,7 +144,7 @@ fn a_second_start_accepts_an_arm_that_is_awake_and_has_its_position_reference() 
 fn an_arm_without_position_reference_is_rejected() {
     let startup_config = StartupConfig {
         zero_at_rad: None,
-        ask: None,
+        confirmation: None,
         ..startup_config::<4>()
     };
     let error = try_start(&mut idle_arm::<4>(EmulatorConfig::wam(4)), &startup_config);

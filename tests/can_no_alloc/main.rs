@@ -10,7 +10,7 @@ use counting::{count_allocations, without_counting};
 use link::InProcessLink;
 use supple_bus::virtual_time::DirectBus;
 use supple_bus::{Bus, BusError, Event, FaultInjector, FaultKind, FaultRule, TrafficDirection};
-use supple_can::{Cycle, StartupConfig, start_up};
+use supple_can::{BarrettLoop, StartupConfig, start_up};
 use supple_can_frame::CanFrame;
 use supple_core::Controller;
 use supple_core::controller::Request;
@@ -38,7 +38,7 @@ impl Bus for Uncounted {
     }
 }
 
-type Service = Cycle<4, FaultInjector<Uncounted>, InProcessLink<4>>;
+type Service = BarrettLoop<4, FaultInjector<Uncounted>, InProcessLink<4>>;
 
 fn press(cycle: &mut Service, press: ButtonPress) {
     cycle.drive_mut().bus_mut().inner_mut().0.0.press(press);
@@ -53,7 +53,7 @@ fn in_service() -> Service {
     let mut bus = FaultInjector::new(Uncounted(DirectBus(arm)), 1);
     let startup_config = StartupConfig {
         zero_at_rad: Some(home_rad),
-        ask: None,
+        confirmation: None,
         limits: SafetyLimits::default(),
         tare: false,
     };
@@ -71,7 +71,7 @@ fn in_service() -> Service {
         answer_ns: MS / 20,
     };
     let link = InProcessLink::new(Controller::new(config).unwrap());
-    supple_can::cycle(bus, link, ready, &config, cycle_config).unwrap()
+    supple_can::new_plant_loop(bus, link, ready, &config, cycle_config).unwrap()
 }
 
 fn run(cycle: &mut Service, cycles: usize) {

@@ -173,7 +173,7 @@ impl EmulatedNodes for EmulatedMoteus {
         self.now_ns
     }
 
-    fn host_sends(&mut self, frame: &CanFrame) {
+    fn receive_from_host(&mut self, frame: &CanFrame) {
         let event = Event::Sent(*frame);
         self.waiting
             .push_back((self.now_ns, RATES.duration_ns(frame), event));

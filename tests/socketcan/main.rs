@@ -15,7 +15,7 @@ use realtime::{HOST_PRIORITY, realtime};
 use arm::Arm;
 use link::InProcessLink;
 use supple_bus::{BusFault, FaultInjector, FaultKind, FaultRule, SocketCan, TrafficDirection};
-use supple_can::{Cycle, StartupConfig, start_up};
+use supple_can::{BarrettLoop, StartupConfig, start_up};
 use supple_core::Controller;
 use supple_core::controller::Request;
 use supple_drive::{CycleConfig, LossReason, Stage};
@@ -31,7 +31,7 @@ const SAFE: usize = 20;
 /// Number of cycles until a button press has reached the motors and the host: 50 ms.
 const PRESSED: usize = 50;
 
-type Service = Cycle<4, FaultInjector<SocketCan>, InProcessLink<4>>;
+type Service = BarrettLoop<4, FaultInjector<SocketCan>, InProcessLink<4>>;
 
 fn run(cycle: &mut Service, cycles: usize) {
     for _ in 0..cycles {
@@ -46,7 +46,7 @@ fn in_service(interface: &str) -> Service {
     let mut bus = FaultInjector::new(SocketCan::open(interface).unwrap(), 1);
     let startup_config = StartupConfig {
         zero_at_rad: Some(description.home::<4>().unwrap()),
-        ask: None,
+        confirmation: None,
         limits: SafetyLimits::default(),
         tare: false,
     };
@@ -66,7 +66,7 @@ fn in_service(interface: &str) -> Service {
         period_ns: PERIOD_NS,
         answer_ns: ANSWER_NS,
     };
-    supple_can::cycle(bus, link, ready, &config, cycle_config).unwrap()
+    supple_can::new_plant_loop(bus, link, ready, &config, cycle_config).unwrap()
 }
 
 fn activate(cycle: &mut Service, arm: &Arm) {

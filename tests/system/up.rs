@@ -278,5 +278,5 @@ fn after_an_emergency_stop_the_operator_must_confirm_the_home_pose() {
         text.contains("supple pendant cradle`, `supple at-home`"),
         "{text}"
     );
-    assert!(text.contains("has lost its positions"), "{text}");
+    assert!(text.contains("has lost its position reference"), "{text}");
 }

@@ -9,7 +9,7 @@ pub trait EmulatedNodes {
     fn now_ns(&self) -> u64;
 
     /// Receives a frame that the host sends at the current time.
-    fn host_sends(&mut self, frame: &CanFrame);
+    fn receive_from_host(&mut self, frame: &CanFrame);
 
     /// Advances the time to the next event for the host, which it returns, or to `until_ns`, whichever comes first.
     fn run_until(&mut self, until_ns: u64) -> Option<Event>;

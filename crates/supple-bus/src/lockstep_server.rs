@@ -44,7 +44,7 @@ impl LockstepServer {
                 }
                 (None, _) if nodes.now_ns() < until_ns => return None,
                 (None, Some((_, frame))) => {
-                    nodes.host_sends(&frame);
+                    nodes.receive_from_host(&frame);
                     self.delivered += 1;
                 }
                 (None, None) => return Some(self.finish(Kind::Reached, nodes.now_ns())),

@@ -33,7 +33,7 @@ impl<P: EmulatedNodes> Bus for DirectBus<P> {
     }
 
     fn send(&mut self, frame: &CanFrame) -> Result<(), BusError> {
-        self.0.host_sends(frame);
+        self.0.receive_from_host(frame);
         Ok(())
     }
 

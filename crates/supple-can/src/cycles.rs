@@ -24,7 +24,7 @@ pub const SEARCH_INTERVAL: Duration = Duration::from_millis(200);
 
 /// Why a run of cycles ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Ended {
+pub enum EndReason {
     /// A shutdown was requested, or all cycles are done; the motors are idle.
     ShutDown,
     /// No motor has replied for [`ARM_LOST_AFTER_NS`].
@@ -40,7 +40,7 @@ pub fn run_until_shutdown<const N: usize, D: Drive<N>>(
     cycles: Option<u64>,
     stop: &Stop,
     joint_names: &[Text],
-) -> Result<Ended, LoopError> {
+) -> Result<EndReason, LoopError> {
     let mut last_reply_ns = plant.drive().now_ns();
     let mut stages = StageReporter::default();
     let all_cycles_done = |done: u64| cycles.is_some_and(|max| done >= max);
@@ -51,7 +51,7 @@ pub fn run_until_shutdown<const N: usize, D: Drive<N>>(
             last_reply_ns = now_ns;
         }
         if now_ns > last_reply_ns + ARM_LOST_AFTER_NS {
-            return Ok(Ended::ArmLost);
+            return Ok(EndReason::ArmLost);
         }
         stages.report(plant, joint_names);
     }
@@ -70,7 +70,7 @@ pub fn run_until_shutdown<const N: usize, D: Drive<N>>(
         plant.run()?;
         stages.report(plant, joint_names);
     }
-    Ok(Ended::ShutDown)
+    Ok(EndReason::ShutDown)
 }
 
 /// Posts the changes of the loss and of the stage of the safe action; holds those last posted.

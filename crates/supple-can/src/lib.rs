@@ -25,6 +25,6 @@ pub use drives::barrett::start_up::{
     ARM_GROUPS, MotorPuck, Progress, Ready, StartupConfig, start_up,
 };
 pub use drives::barrett::transmission::{self, Transmission};
-pub use drives::barrett::{Barrett, CanError, Cycle, cycle};
+pub use drives::barrett::{Barrett, BarrettLoop, CanError, new_plant_loop};
 pub use options::Options;
 pub use program::main;

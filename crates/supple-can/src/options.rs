@@ -9,7 +9,7 @@ use supple_puck::safety::SpeedLimit;
 
 /// Operates an arm on its CAN bus: polls it, publishes its state, and sends the controller's torques.
 ///
-/// It never activates Barrett's pucks: the operator does, at the pendant. Damiao motors have no pendant: it enables them
+/// It never activates Barrett's pucks: the operator does, on the pendant. Damiao motors have no pendant: it enables them
 /// when a controller in gravity hold requests torque. It may end torque at any time. The arm is a WAM with 4 or 7 joints, or
 /// has `[bus]` in its TOML.
 #[derive(Clone, Debug, Parser)]

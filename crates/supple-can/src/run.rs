@@ -1,6 +1,6 @@
 //! A run with any type of drives: start-up, then cycles; repeated after the arm has lost its power.
 
-use crate::cycles::{Ended, SEARCH_INTERVAL, open, run_until_shutdown, sum_counters};
+use crate::cycles::{EndReason, SEARCH_INTERVAL, open, run_until_shutdown, sum_counters};
 use crate::options::Options;
 use supple_bus::{Address, Bus, BusError};
 use supple_core::Config;
@@ -81,7 +81,7 @@ pub fn run_arm<const N: usize, S: Startup<N>>(
             options
                 .process
                 .apply_realtime(Options::NAME, options.priority);
-            link.spin(spin_duration(options.spin_us));
+            link.set_spin_duration(spin_duration(options.spin_us));
         }
         let mut plant = startup.plant_loop(bus, link, ready, first)?;
         first = false;
@@ -90,7 +90,7 @@ pub fn run_arm<const N: usize, S: Startup<N>>(
         counters = sum_counters(&counters, plant.counters());
         let (drive, used_link) = plant.into_parts();
         (bus, link) = (S::into_bus(drive), used_link);
-        if ended == Ended::ShutDown {
+        if ended == EndReason::ShutDown {
             return Ok(counters);
         }
         diagnostics::post(format_args!(

@@ -56,8 +56,8 @@ impl SharedMemoryLink {
     }
 
     /// Sets the time to poll for an answer before blocking, see [`PlantLink::spin`].
-    pub fn spin(&mut self, at_most: Duration) {
-        self.link.spin(at_most);
+    pub fn set_spin_duration(&mut self, at_most: Duration) {
+        self.link.set_spin_duration(at_most);
     }
 }
 

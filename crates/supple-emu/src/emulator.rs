@@ -539,7 +539,7 @@ impl<const N: usize> EmulatedNodes for Emulator<N> {
         self.now_ns
     }
 
-    fn host_sends(&mut self, frame: &CanFrame) {
+    fn receive_from_host(&mut self, frame: &CanFrame) {
         if self.host_bus_off_until_ns.is_none() {
             self.wire.queue(self.now_ns, *frame);
         }

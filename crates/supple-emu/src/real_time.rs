@@ -86,7 +86,7 @@ pub fn receive_host_frame(
         && emulator.is_from_host(&frame)
     {
         advance_to_bus_time(emulator, bus)?;
-        emulator.host_sends(&frame);
+        emulator.receive_from_host(&frame);
     }
     Ok(())
 }

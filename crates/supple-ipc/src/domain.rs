@@ -101,7 +101,7 @@ impl Domain {
 
     /// Returns the files through which the operator confirms that the arm is in its home pose, after it has lost its position
     /// reference.
-    pub fn home_files(&self) -> HomePoseConfirmation {
+    pub fn home_pose_confirmation(&self) -> HomePoseConfirmation {
         HomePoseConfirmation::of(&self.folder, &self.prefix)
     }
 

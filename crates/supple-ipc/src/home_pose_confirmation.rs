@@ -37,7 +37,7 @@ impl HomePoseConfirmation {
     }
 
     /// Removes the request, and an answer that arrives too late.
-    pub fn withdraw(&self) {
+    pub fn remove_request(&self) {
         // Either file may be absent. In this order the operator cannot answer between the two calls.
         let _ = remove(&self.question);
         let _ = remove(&self.answer);

@@ -110,7 +110,7 @@ impl PlantLink {
 
     /// Sets the time for which [`PlantLink::answer`] polls for the answer before it blocks. Many answers arrive sooner than a
     /// blocked thread can be woken. Polling occupies the processor for up to this time in each cycle.
-    pub fn spin(&mut self, at_most: Duration) {
+    pub fn set_spin_duration(&mut self, at_most: Duration) {
         self.spin = at_most;
     }
 

@@ -70,7 +70,7 @@ pub fn run<const N: usize>(
     options
         .process
         .apply_realtime(Options::NAME, options.priority);
-    link.spin(spin_duration(options.spin_us));
+    link.set_spin_duration(spin_duration(options.spin_us));
     let mut simulation = simulation(arm, link, &description.config()?)?;
     let result = run_simulation(
         &mut simulation,

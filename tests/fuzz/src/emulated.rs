@@ -54,7 +54,7 @@ pub fn arm_bus(data: &[u8]) {
                     DecodedFrame::decode(&EncodedFrame::of_data(&frame)),
                     DecodedFrame::Data(frame)
                 );
-                emulator.host_sends(&frame);
+                emulator.receive_from_host(&frame);
             }
             DecodedFrame::Fault(fault) => {
                 assert_eq!(

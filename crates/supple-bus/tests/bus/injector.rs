@@ -18,7 +18,7 @@ impl EmulatedNodes for ScriptedNodes {
         self.now_ns
     }
 
-    fn host_sends(&mut self, frame: &CanFrame) {
+    fn receive_from_host(&mut self, frame: &CanFrame) {
         self.received.push((self.now_ns, *frame));
         self.events.push_front((self.now_ns, Event::Sent(*frame)));
     }

@@ -33,7 +33,7 @@ impl EmulatedNodes for EchoNodes {
         self.now_ns
     }
 
-    fn host_sends(&mut self, frame: &CanFrame) {
+    fn receive_from_host(&mut self, frame: &CanFrame) {
         for event in [Event::Sent(*frame), Event::Frame(echo_of(frame))] {
             self.busy_until_ns = self.busy_until_ns.max(self.now_ns) + FRAME_NS;
             self.events.push_back((self.busy_until_ns, event));

@@ -359,7 +359,7 @@ impl<const N: usize> EmulatedNodes for DamiaoArm<N> {
         self.now_ns
     }
 
-    fn host_sends(&mut self, frame: &CanFrame) {
+    fn receive_from_host(&mut self, frame: &CanFrame) {
         if self.bus_off_until_ns.is_none() && !self.wedged {
             self.wire.queue(self.now_ns, *frame);
         }

@@ -139,7 +139,7 @@ fn join_succeeds_during_concurrent_joins_and_leaves() {
 fn polling_plant_gets_its_answers_and_blocks_without_one() {
     let system = system("spin");
     let mut plant = PlantLink::new(&system.domain).expect("a plant");
-    plant.spin(Duration::from_millis(1));
+    plant.set_spin_duration(Duration::from_millis(1));
     let domain = &system.domain;
     std::thread::scope(|scope| {
         scope.spawn(move || {

@@ -30,7 +30,7 @@ impl Injection {
             (InjectionKind::EncoderNan { .. }, _) => {
                 "encoder counts are always numbers: use reply-lost:every=1"
             }
-            (InjectionKind::DrivesIdle { .. }, _) => "set the drives to idle at the pendant",
+            (InjectionKind::DrivesIdle { .. }, _) => "set the drives to idle on the pendant",
             _ => return Ok(()),
         };
         Err(InjectionError::NotOnBus {

@@ -322,7 +322,7 @@ fn run<const N: usize>(
                 // The arm is not in its home pose: no confirmation is given.
                 Ok(false)
                     if spec.event == Event::Drives(DriveShutdown::EStop)
-                        && domain.home_files().requested_pose().is_some() =>
+                        && domain.home_pose_confirmation().requested_pose().is_some() =>
                 {
                     break;
                 }

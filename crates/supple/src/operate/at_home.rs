@@ -22,7 +22,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(20);
 /// [`Failure::NotConfirmed`] if the operator declines, or without both a terminal and `--yes`.
 pub fn at_home(args: &AtHomeArgs) -> Result<(), Failure> {
     let (domain, mut reader, _) = running(&args.system)?;
-    let files = domain.home_files();
+    let files = domain.home_pose_confirmation();
     let mut pose = None;
     poll_until(REQUEST_TIMEOUT, || {
         pose = files.requested_pose();
@@ -51,7 +51,7 @@ pub fn at_home(args: &AtHomeArgs) -> Result<(), Failure> {
         return Err(Failure::system(error));
     }
     if !back {
-        files.withdraw();
+        files.remove_request();
         return Err(Failure::NoArmWaits);
     }
     match args.system.json {

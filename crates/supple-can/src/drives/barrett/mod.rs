@@ -4,14 +4,14 @@ pub mod bus_time;
 pub mod start_up;
 pub mod transmission;
 
-mod cycle;
 mod drive;
 mod error;
 mod host;
+mod plant_loop;
 mod program;
 mod sensor;
 
-pub use cycle::{Cycle, cycle};
+pub use plant_loop::{BarrettLoop, new_plant_loop};
 
 pub use drive::Barrett;
 pub use error::CanError;

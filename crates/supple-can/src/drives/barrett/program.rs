@@ -1,9 +1,9 @@
 //! A run with Barrett's drives.
 
 use super::bus_time::BusTime;
-use super::cycle::{Cycle, cycle};
 use super::drive::Barrett;
 use super::error::CanError;
+use super::plant_loop::{BarrettLoop, new_plant_loop};
 use super::start_up::{Progress, Ready, StartupConfig, start_up};
 use crate::options::{Options, print_budget};
 use crate::run::{Startup, run_arm};
@@ -19,7 +19,7 @@ use supple_realtime::{Stop, diagnostics};
 /// was requested.
 ///
 /// # Errors
-/// [`CanError`] with the mismatch and the remedy.
+/// [`CanError`], with the cause and the remedy.
 pub fn run(
     description: &Description,
     options: &Options,
@@ -52,8 +52,8 @@ fn run_joints<const N: usize>(
         ..defaults
     };
     let domain = Domain::new(Some(&options.process.prefix))?;
-    // A process that was killed while it asked has left its question.
-    domain.home_files().withdraw();
+    // A process that was killed while it waited for the confirmation has left its request.
+    domain.home_pose_confirmation().remove_request();
     let mut startup = Pucks {
         description,
         options,
@@ -92,7 +92,7 @@ impl<const N: usize> Startup<N> for Pucks<'_, N> {
         // unloaded, because an option says so.
         let startup_config = StartupConfig {
             zero_at_rad: (first && self.options.zero_at_home).then_some(self.home_rad),
-            ask: (!first).then(|| self.domain.home_files()),
+            confirmation: (!first).then(|| self.domain.home_pose_confirmation()),
             limits: self.limits,
             tare: first && self.options.tare,
         };
@@ -124,8 +124,8 @@ impl<const N: usize> Startup<N> for Pucks<'_, N> {
         link: SharedMemoryLink,
         ready: Ready<N>,
         _: bool,
-    ) -> Result<Cycle<N, Box<dyn Bus>, SharedMemoryLink>, CanError> {
-        cycle(bus, link, ready, self.config, self.cycle_config)
+    ) -> Result<BarrettLoop<N, Box<dyn Bus>, SharedMemoryLink>, CanError> {
+        new_plant_loop(bus, link, ready, self.config, self.cycle_config)
     }
 
     fn into_bus(drive: Self::Drive) -> Box<dyn Bus> {
@@ -137,7 +137,7 @@ fn report_progress(progress: Progress) {
     match progress {
         Progress::WaitingForIdle => {
             diagnostics::post(format_args!(
-                "supple-can: release the emergency stop and press Shift-Idle at the pendant"
+                "supple-can: release the emergency stop and press Shift-Idle on the pendant"
             ));
         }
         Progress::Enumerating => diagnostics::post(format_args!(
@@ -150,16 +150,16 @@ fn report_progress(progress: Progress) {
             "supple-can: comparing the pucks with the description"
         )),
         Progress::WaitingForHome => diagnostics::post(format_args!(
-            "supple-can: the arm has lost its positions: put it into its home pose, then confirm it with `supple at-home`"
+            "supple-can: the arm has lost its position reference: move it to its home pose, then confirm that with `supple at-home`"
         )),
         Progress::Zeroing => diagnostics::post(format_args!(
-            "supple-can: setting the positions to the home pose"
+            "supple-can: setting the position counters to the home pose; the arm does not move"
         )),
         Progress::Taring => {
             diagnostics::post(format_args!("supple-can: taring the force/torque sensor"))
         }
         Progress::Ready => diagnostics::post(format_args!(
-            "supple-can: ready; with a controller that holds the arm, press Shift-Activate"
+            "supple-can: ready: start a controller in gravity hold, then press Shift-Activate"
         )),
     }
 }

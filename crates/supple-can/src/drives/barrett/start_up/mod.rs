@@ -45,7 +45,7 @@ pub struct StartupConfig<const N: usize> {
     pub zero_at_rad: Option<Vector<N>>,
     /// Files through which start-up asks the operator to confirm the home pose if the current pose is unknown; with `None`
     /// an unknown pose is an error.
-    pub ask: Option<HomePoseConfirmation>,
+    pub confirmation: Option<HomePoseConfirmation>,
     /// Limits of the safety module.
     pub limits: SafetyLimits,
     /// Whether to tare the force/torque sensor, if the arm has one; otherwise the sensor keeps its last tare.
@@ -283,12 +283,12 @@ fn set_home_positions<const N: usize, B: Bus>(
     if found == 1 {
         return Ok(());
     }
-    let home = match (startup_config.zero_at_rad, &startup_config.ask) {
+    let home = match (startup_config.zero_at_rad, &startup_config.confirmation) {
         (Some(home), _) => home,
         (None, Some(files)) => {
             progress(Progress::WaitingForHome);
             let confirmed = wait_for_home(host, module, description, files);
-            files.withdraw();
+            files.remove_request();
             confirmed?
         }
         (None, None) => {

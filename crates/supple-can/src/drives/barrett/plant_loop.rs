@@ -8,19 +8,19 @@ use supple_core::Config;
 use supple_drive::{CycleConfig, Link, PlantLoop};
 
 /// The plant loop of an arm with Barrett's drives.
-pub type Cycle<const N: usize, B, L> = PlantLoop<N, Barrett<N, B>, L>;
+pub type BarrettLoop<const N: usize, B, L> = PlantLoop<N, Barrett<N, B>, L>;
 
 /// Creates the plant loop of an arm that has completed start-up.
 ///
 /// # Errors
 /// [`CanError::Overload`] if the period exceeds the bus bandwidth; an error if a puck's firmware lacks a property.
-pub fn cycle<const N: usize, B: Bus, L: Link<N>>(
+pub fn new_plant_loop<const N: usize, B: Bus, L: Link<N>>(
     bus: B,
     link: L,
     ready: start_up::Ready<N>,
     config: &Config<N>,
     cycle_config: CycleConfig,
-) -> Result<Cycle<N, B, L>, CanError> {
+) -> Result<BarrettLoop<N, B, L>, CanError> {
     let drive = Barrett::new(bus, ready, cycle_config)?;
     Ok(PlantLoop::new(drive, link, config, cycle_config, None)?)
 }
