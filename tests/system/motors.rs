@@ -128,7 +128,7 @@ fn motors_that_do_not_match_are_reported_with_a_remedy() {
     let text = stderr_of(&output);
     for words in [
         "motor 2 does not answer; check its supply",
-        "motor 3 register 22 (VMAX) is 8, expected 10; correct the arm's file",
+        "motor 3 register 22 (VMAX) is 8, expected 10; check that the motor is the right one, then correct the arm's file",
         "motor 5 reports: winding too hot; remove the cause",
     ] {
         assert!(text.contains(words), "{text}");

@@ -169,9 +169,29 @@ fn commands_use_the_arm_of_the_running_system() {
         let other = up.run(&[command, &["--arm", "wam4"]].concat());
         let words = stderr_of(&other);
         assert_eq!(other.status.code(), Some(3), "{words}");
-        for part in ["has 4 joints", "running system 3", "--arm wam3"] {
+        for part in ["has 4 joints", "running system has 3 joints", "--arm wam3"] {
             assert!(words.contains(part), "{part}: {words}");
         }
+    }
+    // As many joints, of other names.
+    let folder = tempfile::tempdir().expect("a folder");
+    let copy = folder.path().join("copy");
+    let copy = copy.to_str().expect("UTF-8");
+    assert!(up.run(&["arms", "copy", "wam3", copy]).status.success());
+    for file in ["arm.toml", "arm.urdf"] {
+        let path = folder.path().join("copy").join(file);
+        let text = std::fs::read_to_string(&path).expect("copied");
+        std::fs::write(&path, text.replace("joint1", "shoulder")).expect("written");
+    }
+    let other = up.run(&["track", "arc", "--arm", copy]);
+    let words = stderr_of(&other);
+    assert_eq!(other.status.code(), Some(3), "{words}");
+    for part in [
+        "the joints shoulder, ",
+        "has the joints joint1, ",
+        "--arm wam3",
+    ] {
+        assert!(words.contains(part), "{part}: {words}");
     }
 }
 

@@ -240,7 +240,10 @@ fn outputs_of_a_run_that_replace_one_another_are_code_6_before_anything_is_writt
             &[&up[..], &["--log", log, "--trace", trace]].concat(),
         );
         assert_eq!(answer.code, Some(6), "{log} {trace}: {}", answer.stderr);
-        assert_one_clear_line(&answer, &[trace, log, "--trace", "--log", "different names"]);
+        assert_one_clear_line(
+            &answer,
+            &[trace, log, "--trace", "--log", "different names"],
+        );
     }
     for trace in ["/proc/self/x", "none/trace.csv"] {
         let answer = run_in(
