@@ -35,7 +35,7 @@ fn is_regular<const N: usize>(task: &Task<N>) -> bool {
 }
 
 impl<const N: usize> State<N> {
-    /// Returns relaxed position limits step by step to those of the configuration.
+    /// Tightens relaxed position limits step by step until they are those of the configuration again.
     #[inline(always)]
     pub(super) fn update_position_limits(&mut self, config: &Config<N>, elapsed_s: f64) {
         if self.position_limits.relaxed {

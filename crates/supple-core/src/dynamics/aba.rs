@@ -184,7 +184,7 @@ impl Articulated {
         self.force = add(self.force, other.force);
     }
 
-    /// Returns articulated inertia and bias force at the parent: projects out the joint's free
+    /// Replaces articulated inertia and bias force by those that the parent feels: projects out the joint's free
     /// direction.
     #[inline(always)]
     fn project(&mut self, hinge: &AbaJoint) {
