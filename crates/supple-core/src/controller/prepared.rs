@@ -7,7 +7,6 @@ use super::nullspace::nullspace_damping_nm_s_per_rad;
 use super::plausibility::AgainstTorqueLimits;
 use super::validate::{self, ConfigError};
 use crate::config::{Config, RippleTable};
-use crate::law::task::count_active;
 use crate::math::linalg::Cholesky;
 use crate::math::{Matrix, Vector, sqrt};
 use crate::model::learned::LearnedBounds;
@@ -23,8 +22,6 @@ pub struct Controller<const N: usize> {
     /// External torque on the motor of each encoder above which dry friction does not hold it \[N m\].
     stiction_limit_nm: Vector<N>,
     pub(super) delay_s: f64,
-    /// Number of active joints.
-    pub(super) active_joints: usize,
     /// Whether a motor has a ripple table.
     pub(super) has_ripple: bool,
     /// Whether a part of the ripple is proportional to the torque.
@@ -84,7 +81,6 @@ impl<const N: usize> Controller<N> {
             motor_from_joint,
             groups: MotorGroups::new(&config.joint_from_motor),
             delay_s,
-            active_joints: count_active(&config.roles),
             has_ripple: config
                 .ripple
                 .iter()
@@ -121,10 +117,6 @@ impl<const N: usize> Controller<N> {
     /// velocity estimate.
     pub fn delay_s(&self) -> f64 {
         self.delay_s
-    }
-
-    pub(super) fn active_joints(&self) -> usize {
-        self.active_joints
     }
 
     pub(super) fn has_ripple(&self) -> bool {

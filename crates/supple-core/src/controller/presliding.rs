@@ -77,8 +77,8 @@ fn velocity_at_reference<const N: usize>(
     let (mut turned, mut turning) = (Vector3::zeros(), Vector3::zeros());
     let mut bias = Vector3::zeros();
     for j in 0..N {
-        let axis = terms.jacobian.fixed_view::<3, 1>(3, j).into_owned();
-        let lever = terms.jacobian.fixed_view::<3, 1>(0, j).into_owned();
+        let [lx, ly, lz, ax, ay, az] = terms.jacobian.data.0[j];
+        let (lever, axis) = (Vector3::new(lx, ly, lz), Vector3::new(ax, ay, az));
         turned += axis * change[j];
         bias += turned.cross(&(lever * velocity[j])) + turning.cross(&(lever * change[j]));
         turning += axis * velocity[j];

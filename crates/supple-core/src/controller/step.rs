@@ -35,7 +35,7 @@ pub fn step<const N: usize>(
     if controller.has_load_friction() {
         state.update_friction(config);
     }
-    let task = Task::with_count(&state.terms, &config.roles, controller.active_joints());
+    let task = Task::new(&state.terms, &config.roles);
     if task.is_none() {
         state.latch_fault(controller, Fault::MassMatrix);
     }
@@ -57,7 +57,7 @@ pub fn step<const N: usize>(
     }
 
     let tip_position = state.terms.base_from_tip.translation;
-    let tip_velocity = state.terms.jacobian.fixed_rows::<3>(0) * velocity;
+    let tip_velocity = state.terms.tip_velocity::<3>(&velocity);
     let mut reference = state.reference(config);
     if let Err(fault) = state.check(config, &tip_velocity, reference.as_ref()) {
         state.latch_fault(controller, fault);

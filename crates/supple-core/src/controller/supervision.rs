@@ -178,8 +178,7 @@ impl<const N: usize> State<N> {
             let input = LatchInput {
                 force_n: force,
                 friction_uncertainty_n,
-                tip_velocity_m_per_s: self.terms.jacobian.fixed_rows::<3>(0)
-                    * self.estimator.velocity_rad_per_s,
+                tip_velocity_m_per_s: self.terms.tip_velocity(&self.estimator.velocity_rad_per_s),
             };
             self.latch.update_contact(&config.latch, &input, elapsed_s);
             let gravity = config.arm.gravity();

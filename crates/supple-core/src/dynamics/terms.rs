@@ -49,6 +49,20 @@ impl<const N: usize> Default for Terms<N> {
     }
 }
 
+impl<const N: usize> Terms<N> {
+    /// Returns the first `D` entries of the tip's velocity at the joint velocities `qd` \[rad/s\], linear first, base axes \[m/s, rad/s\].
+    #[inline(always)]
+    pub(crate) fn tip_velocity<const D: usize>(&self, qd: &Vector<N>) -> Vector<D> {
+        let mut velocity = Vector::<D>::zeros();
+        for (column, speed) in self.jacobian.data.0.iter().zip(&qd.data.0[0]) {
+            for (sum, entry) in velocity.data.0[0].iter_mut().zip(column) {
+                *sum += entry * speed;
+            }
+        }
+        velocity
+    }
+}
+
 /// Fills `out` for the state `q` \[rad\], `qd` \[rad/s\].
 #[cfg_attr(not(debug_assertions), inline)]
 pub fn terms<const N: usize>(arm: &Arm<N>, q: &Vector<N>, qd: &Vector<N>, out: &mut Terms<N>) {

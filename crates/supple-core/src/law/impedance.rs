@@ -158,8 +158,8 @@ pub fn impedance<T: Target<D>, const N: usize, const D: usize>(
 ) -> Torques<N> {
     let tip = Tip {
         base_from_tip: terms.base_from_tip,
-        velocity: terms.jacobian.fixed_rows::<D>(0) * input.velocity_rad_per_s,
-        bias: terms.jacobian_dot_qd.fixed_rows::<D>(0).into_owned(),
+        velocity: terms.tip_velocity(input.velocity_rad_per_s),
+        bias: Vector::from_fn(|i, _| terms.jacobian_dot_qd[i]),
     };
     let torques = Torques {
         gravity: terms.gravity,

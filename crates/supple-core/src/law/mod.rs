@@ -1,5 +1,6 @@
 //! The impedance law for the tip's position or pose, with its task, targets and torque terms.
 
+mod consistent_inverse;
 pub mod impedance;
 pub mod learned;
 mod sum;

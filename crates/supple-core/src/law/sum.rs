@@ -65,8 +65,8 @@ fn by_mass_matrix<T: Target<D>, const D: usize, const N: usize, const G: usize>(
 ) -> Option<Vector<N>> {
     let mut terms = Terms::default();
     fill(sweep, arm, input.velocity_rad_per_s, &mut terms);
-    let task = Task::from_terms(&terms, roles)?;
-    let bias = terms.jacobian_dot_qd.fixed_rows::<D>(0).into_owned();
+    let task = Task::from_sweep(sweep, arm, roles)?;
+    let bias = first(sweep.tip_bias_acceleration::<N>());
     let sum = TermSum::new(roles, &task, sweep, bias, input);
     let inertial = terms.mass_matrix * (task.inverse * sum.acceleration);
     let force = task.jacobian.tr_mul(&sum.force);

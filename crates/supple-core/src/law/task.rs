@@ -16,13 +16,15 @@
 //! / m` with `f(x) = (1 - x^2)^2` below 1 and zero above, so that at most about `m` is commanded:
 //! [`MAX_TASK_MASS_KG`] along the axes and [`MAX_TASK_INERTIA_KG_M2`] about them.
 
+use super::consistent_inverse::consistent_inverse;
 use crate::config::Role;
-use crate::dynamics::Terms;
-use crate::math::lanes::NEGATIVE_ZERO;
+use crate::dynamics::{Sweep, Terms};
+use crate::math::lanes::{Columns, LANES, Lanes, columns, entry, in_groups};
 use crate::math::linalg::{
-    Cholesky, Inverse3, is_positive_definite_3, min_singular_value, singular_values_exceed,
+    Inverse3, first_rows, is_positive_definite_3, min_singular_value, singular_values_exceed,
 };
 use crate::math::{Matrix, Matrix3};
+use crate::model::arm::Arm;
 
 /// Smallest singular value of the active Jacobian below which the position's inverse is damped \[m\].
 pub const SINGULAR_BELOW_M: f64 = 0.18;
@@ -80,19 +82,6 @@ impl<const N: usize> Task<N, 3> {
     pub fn new(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N, 3>> {
         Task::from_terms(terms, roles)
     }
-
-    /// As [`Task::new`], for a caller that has counted the active joints before and reads the smallest singular value.
-    #[inline(always)]
-    pub(crate) fn with_count(
-        terms: &Terms<N>,
-        roles: &[Role; N],
-        active: usize,
-    ) -> Option<Task<N, 3>> {
-        let jacobian = active_jacobian(terms, roles, active);
-        let sigma = min_singular_value(&jacobian);
-        let damping = singularity_damping_per_kg(sigma);
-        Task::from_jacobian(jacobian, terms, roles, active, sigma, damping)
-    }
 }
 
 impl<const N: usize> Task<N, 6> {
@@ -104,42 +93,52 @@ impl<const N: usize> Task<N, 6> {
 }
 
 impl<const N: usize, const D: usize> Task<N, D> {
-    /// The task in `D` directions. Far from a singular pose a cheap bound shows that the position needs no damping: nothing else
-    /// then depends on the smallest singular value, whose computation takes as long as the rest and is left out where nobody
-    /// reads it.
     #[inline(always)]
-    pub(crate) fn from_terms(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N, D>> {
+    fn from_terms(terms: &Terms<N>, roles: &[Role; N]) -> Option<Task<N, D>> {
+        in_groups!(N, from_terms[D](terms, roles))
+    }
+
+    /// Returns the task of a swept arm, as [`Task::new`] and [`Task::of_pose`].
+    #[inline(always)]
+    pub(crate) fn from_sweep<const G: usize>(
+        sweep: &Sweep<G>,
+        arm: &Arm<N>,
+        roles: &[Role; N],
+    ) -> Option<Task<N, D>> {
+        // From the lanes, not from a matrix: a vector load of numbers that were just stored one by one stalls.
+        let mut jacobian = Matrix::<D, N>::zeros();
+        for (joint, column) in jacobian.data.0.iter_mut().enumerate() {
+            for (direction, x) in column.iter_mut().enumerate() {
+                *x = entry(&sweep.motions[direction], joint);
+            }
+        }
+        Task::from_matrices(jacobian, sweep.mass(arm), roles)
+    }
+
+    /// The task from the Jacobian of all joints and the columns of the mass matrix.
+    ///
+    /// Far from a singular pose a cheap bound shows that the position needs no damping: nothing else then depends on the smallest
+    /// singular value, whose computation takes as long as the rest and is left out where nobody reads it.
+    #[inline(always)]
+    fn from_matrices<const G: usize>(
+        mut jacobian: Matrix<D, N>,
+        mut mass_matrix: Columns<N, G>,
+        roles: &[Role; N],
+    ) -> Option<Task<N, D>> {
+        const { assert!(D == 3 || D == 6, "a task is a position or a pose") };
         let active = count_active(roles);
-        let position = active_jacobian::<N, 3>(terms, roles, active);
+        if D == 6 && active < D {
+            return None;
+        }
+        if active != N {
+            remove_held(&mut jacobian, roles);
+        }
+        let position: Matrix<3, N> = first_rows(&jacobian);
         let sigma = min_singular_value(&position);
         let damping = if D == 3 && !singular_values_exceed(&position.data.0, SINGULAR_BELOW_M) {
             singularity_damping_per_kg(sigma)
         } else {
             0.0
-        };
-        let jacobian = active_jacobian(terms, roles, active);
-        Task::from_jacobian(jacobian, terms, roles, active, sigma, damping)
-    }
-
-    #[inline(always)]
-    fn from_jacobian(
-        jacobian: Matrix<D, N>,
-        terms: &Terms<N>,
-        roles: &[Role; N],
-        active: usize,
-        sigma: f64,
-        damping: f64,
-    ) -> Option<Task<N, D>> {
-        const { assert!(D == 3 || D == 6, "a task is a position or a pose") };
-        if D == 6 && active < D {
-            return None;
-        }
-        let decoupled;
-        let mass_matrix = if active == N {
-            &terms.mass_matrix
-        } else {
-            decoupled = active_mass_matrix(terms, roles);
-            &decoupled
         };
         let mut is_damped = damping != 0.0;
         let three_joints = if N == 3 && active == 3 {
@@ -152,24 +151,23 @@ impl<const N: usize, const D: usize> Task<N, D> {
         let inverse = match three_joints {
             Some(joints) if D == 3 && damping == 0.0 => {
                 // The inverse does not use the mass matrix, but a matrix that is not positive definite is rejected here too.
-                if !is_positive_definite_3(mass_matrix, joints) {
+                if !is_positive_definite_3(|i, j| entry(&mass_matrix[j], i), joints) {
                     return None;
                 }
                 inverse_of_three(&jacobian, joints)
             }
             _ => {
-                let inverse_mass_jt = Cholesky::new(mass_matrix)?.solve(&jacobian.transpose());
-                let mobility = lower_product(&jacobian, &inverse_mass_jt, damping);
-                let factor = if D == 3 {
-                    Cholesky::new(&mobility)?
-                } else {
-                    Cholesky::with_pivots(&mobility, |i, pivot| {
-                        let damped = damped_pivot(i, pivot);
-                        is_damped |= damped != pivot;
-                        damped
-                    })?
-                };
-                factor.solve(&inverse_mass_jt.transpose()).transpose()
+                if active != N {
+                    decouple_held(&mut mass_matrix, roles);
+                }
+                consistent_inverse(&mass_matrix, &jacobian, |i, pivot| {
+                    if D == 3 {
+                        return pivot + damping;
+                    }
+                    let damped = damped_pivot(i, pivot);
+                    is_damped |= damped != pivot;
+                    damped
+                })?
             }
         };
         Some(Task {
@@ -179,6 +177,15 @@ impl<const N: usize, const D: usize> Task<N, D> {
             is_damped,
         })
     }
+}
+
+#[inline(always)]
+fn from_terms<const D: usize, const N: usize, const G: usize>(
+    terms: &Terms<N>,
+    roles: &[Role; N],
+) -> Option<Task<N, D>> {
+    let mass_matrix: Columns<N, G> = columns(&terms.mass_matrix);
+    Task::from_matrices(first_rows(&terms.jacobian), mass_matrix, roles)
 }
 
 /// The position task of an arm with three joints, all active, independent of the mass matrix; `None` near singular
@@ -198,57 +205,35 @@ pub(crate) fn square_task<const N: usize, const D: usize>(
     })
 }
 
-/// Returns the lower triangle of `J H^-1 J^T + damping`; the other elements are zero.
+/// Sets the columns of held joints to zero.
 #[inline(always)]
-fn lower_product<const N: usize, const D: usize>(
-    jacobian: &Matrix<D, N>,
-    inverse_mass_jt: &Matrix<N, D>,
-    damping: f64,
-) -> Matrix<D, D> {
-    let mut product = Matrix::zeros();
-    for j in 0..D {
-        for i in j..D {
-            let mut sum = NEGATIVE_ZERO;
-            for k in 0..N {
-                sum += jacobian.data.0[k][i] * inverse_mass_jt.data.0[j][k];
-            }
-            product.data.0[j][i] = sum + if i == j { damping } else { 0.0 };
+fn remove_held<const N: usize, const D: usize>(jacobian: &mut Matrix<D, N>, roles: &[Role; N]) {
+    for (column, role) in jacobian.data.0.iter_mut().zip(roles) {
+        if *role != Role::Active {
+            *column = [0.0; D];
         }
     }
-    product
 }
 
-/// The first `D` rows of the Jacobian, with the columns of held joints zero.
+/// Sets the rows and columns of held joints to those of the identity.
 #[inline(always)]
-fn active_jacobian<const N: usize, const D: usize>(
-    terms: &Terms<N>,
+fn decouple_held<const N: usize, const G: usize>(
+    mass_matrix: &mut Columns<N, G>,
     roles: &[Role; N],
-    active: usize,
-) -> Matrix<D, N> {
-    let mut jacobian: Matrix<D, N> = terms.jacobian.fixed_rows::<D>(0).into_owned();
-    if active == N {
-        return jacobian;
-    }
-    for (i, role) in roles.iter().enumerate() {
-        if *role != Role::Active {
-            jacobian.column_mut(i).fill(0.0);
+) {
+    let is_active = |i: usize| i < N && roles[i] == Role::Active;
+    for (j, column) in mass_matrix.iter_mut().enumerate() {
+        for (group, x) in column.iter_mut().enumerate() {
+            let mut lanes = x.to_array();
+            for (lane, number) in lanes.iter_mut().enumerate() {
+                let i = group * LANES + lane;
+                if !(is_active(i) && is_active(j)) {
+                    *number = if i == j { 1.0 } else { 0.0 };
+                }
+            }
+            *x = Lanes::new(lanes);
         }
     }
-    jacobian
-}
-
-/// Returns the mass matrix, with the rows and columns of held joints as those of the identity.
-#[inline(always)]
-fn active_mass_matrix<const N: usize>(terms: &Terms<N>, roles: &[Role; N]) -> Matrix<N, N> {
-    let mut mass_matrix = terms.mass_matrix;
-    for (i, role) in roles.iter().enumerate() {
-        if *role != Role::Active {
-            mass_matrix.row_mut(i).fill(0.0);
-            mass_matrix.column_mut(i).fill(0.0);
-            mass_matrix[(i, i)] = 1.0;
-        }
-    }
-    mass_matrix
 }
 
 /// Returns the number of active joints.

@@ -19,22 +19,12 @@ impl<const N: usize> Cholesky<N> {
     /// Reads the lower triangle of `a`. `None` if `a` is not positive definite.
     #[inline(always)]
     pub fn new(a: &Matrix<N, N>) -> Option<Self> {
-        Self::with_pivots(a, |_, pivot| pivot)
-    }
-
-    /// Factors `A + E` with `E` diagonal: `adjust_pivot(i, pivot)` gives pivot `i` during the
-    /// factorisation. Reads the lower triangle of `a`. `None` if `A + E` is not positive definite.
-    #[inline(always)]
-    pub(crate) fn with_pivots(
-        a: &Matrix<N, N>,
-        mut adjust_pivot: impl FnMut(usize, f64) -> f64,
-    ) -> Option<Self> {
         let mut rest = a.data.0;
         let mut inverse_pivots = [0.0; N];
         let mut definite = true;
         for k in 0..N {
             let column = rest[k];
-            let pivot = adjust_pivot(k, column[k]);
+            let pivot = column[k];
             definite &= pivot > 0.0 && pivot < f64::INFINITY;
             inverse_pivots[k] = 1.0 / pivot;
             for i in k + 1..N {

@@ -9,6 +9,7 @@
 //! twice in other builds. The choice is made at compile time, never at run time, so that all
 //! binaries of one build give identical results.
 
+use crate::math::Matrix;
 use core::array::from_fn;
 use core::ops::{Add, Mul, Neg, Sub};
 pub(crate) use wide::f64x4 as Lanes;
@@ -224,6 +225,19 @@ pub(crate) fn entry<const G: usize>(column: &Column<G>, i: usize) -> f64 {
 pub(crate) fn column<const N: usize, const G: usize>(numbers: &[f64; N]) -> Column<G> {
     let [column] = rows::<1, N, G>(|_, i| numbers[i]);
     column
+}
+
+/// Returns the columns of a matrix, each padded with zeros.
+#[inline(always)]
+pub(crate) fn columns<const R: usize, const C: usize, const G: usize>(
+    m: &Matrix<R, C>,
+) -> Columns<C, G> {
+    // Not `map`, which the compiler does not always inline.
+    let mut columns = [[Lanes::ZERO; G]; C];
+    for (to, from) in columns.iter_mut().zip(&m.data.0) {
+        *to = column(from);
+    }
+    columns
 }
 
 /// Returns `s x`, entry by entry.

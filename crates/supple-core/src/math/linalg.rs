@@ -11,6 +11,20 @@ use core::f64::consts::SQRT_2;
 
 pub use crate::math::cholesky::Cholesky;
 
+/// Returns the first `D` rows; nalgebra's copy of `fixed_rows` took a fifth of the time of the law.
+#[inline(always)]
+pub(crate) fn first_rows<const R: usize, const C: usize, const D: usize>(
+    m: &Matrix<R, C>,
+) -> Matrix<D, C> {
+    let mut rows = Matrix::<D, C>::zeros();
+    for (row, column) in rows.data.0.iter_mut().zip(&m.data.0) {
+        for (x, y) in row.iter_mut().zip(column) {
+            *x = *y;
+        }
+    }
+    rows
+}
+
 /// Eigenvalues of a symmetric 3 x 3 matrix in ascending order; the upper triangle is read.
 ///
 /// Closed form by the characteristic cubic, reduced to `4 y^3 - 3 y = x`. Relative to the largest
@@ -105,10 +119,12 @@ pub fn singular_values_exceed<const N: usize>(j: &[[f64; 3]; N], bound: f64) -> 
 /// Returns whether the submatrix of the three rows and columns `at` of a symmetric matrix is positive definite, by its
 /// leading minors. Reads the lower triangle.
 #[inline]
-pub(crate) fn is_positive_definite_3<const N: usize>(a: &Matrix<N, N>, at: [usize; 3]) -> bool {
-    let [x, y, z] = at;
-    let (xx, yx, yy) = (a[(x, x)], a[(y, x)], a[(y, y)]);
-    let (zx, zy, zz) = (a[(z, x)], a[(z, y)], a[(z, z)]);
+pub(crate) fn is_positive_definite_3(
+    a: impl Fn(usize, usize) -> f64,
+    [x, y, z]: [usize; 3],
+) -> bool {
+    let (xx, yx, yy) = (a(x, x), a(y, x), a(y, y));
+    let (zx, zy, zz) = (a(z, x), a(z, y), a(z, z));
     let minor = xx * yy - yx * yx;
     let determinant = zz * minor + zx * (yx * zy - yy * zx) - zy * (xx * zy - yx * zx);
     (xx > 0.0) & (minor > 0.0) & (determinant > 0.0) & (determinant < f64::INFINITY)
@@ -145,7 +161,11 @@ impl Inverse3 {
     #[inline(always)]
     pub fn rows(&self) -> [V3; 3] {
         let scale = 1.0 / self.determinant;
-        self.rows.map(|row| row.map(|entry| entry * scale))
+        let mut rows = self.rows;
+        for entry in rows.as_flattened_mut() {
+            *entry *= scale;
+        }
+        rows
     }
 }
 
