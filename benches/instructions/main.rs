@@ -162,10 +162,10 @@ fn limit(instructions: u64) -> LibraryBenchmarkConfig {
 // Near a singular pose the law for three joints takes the longer code path.
 #[bench::law_3(args = (position_sum::<3>("wam3")), config = limit(5_950))]
 #[bench::law_4(args = (position_sum::<4>("wam4")), config = limit(4_900))]
-#[bench::law_7(args = (pose_sum::<7>("wam7")), config = limit(15_400))]
-#[bench::law_apart_3(args = (position_apart::<3>("wam3")), config = limit(4_850))]
+#[bench::law_7(args = (pose_sum::<7>("wam7")), config = limit(13_800))]
+#[bench::law_apart_3(args = (position_apart::<3>("wam3")), config = limit(4_500))]
 #[bench::law_apart_4(args = (position_apart::<4>("wam4")), config = limit(5_550))]
-#[bench::law_apart_7(args = (pose_apart::<7>("wam7")), config = limit(17_500))]
+#[bench::law_apart_7(args = (pose_apart::<7>("wam7")), config = limit(15_500))]
 // Without the checks of plausibility, collision and stopping the counts were 6,246, 6,926 and 15,215. The limits are a tenth
 // above.
 #[bench::step_3(args = (controller_step::<3>("wam3")), config = limit(6_870))]

@@ -290,7 +290,7 @@ fn check_joint_motion<const N: usize>(
         {
             return Err(Refusal::Workspace { border, value_m });
         }
-        let tip_velocity = dynamics.tip_velocity::<3>(&qd);
+        let tip_velocity = dynamics.jacobian.fixed_rows::<3>(0) * qd;
         let limit = SPEED_SHARE * speed_share * config.limits.tip_speed_m_per_s;
         let value = tip_velocity.norm();
         if value > limit {

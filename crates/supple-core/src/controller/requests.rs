@@ -239,9 +239,7 @@ impl<const N: usize> State<N> {
     /// Refuses a compliant mode while the arm exceeds that mode's speed limits: the first cycle would raise a fault.
     fn check_compliant_speed(&self, config: &Config<N>) -> Result<(), Refusal> {
         self.check_speed(config, COMPLIANT_SPEED_SHARE)?;
-        let tip = self
-            .terms
-            .tip_velocity::<3>(&self.estimator.velocity_rad_per_s);
+        let tip = self.terms.jacobian.fixed_rows::<3>(0) * self.estimator.velocity_rad_per_s;
         let (value, limit) = (
             sqrt(tip.dot(&tip)),
             COMPLIANT_SPEED_SHARE * config.limits.tip_speed_m_per_s,

@@ -57,7 +57,7 @@ pub fn step<const N: usize>(
     }
 
     let tip_position = state.terms.base_from_tip.translation;
-    let tip_velocity = state.terms.tip_velocity::<3>(&velocity);
+    let tip_velocity = state.terms.jacobian.fixed_rows::<3>(0) * velocity;
     let mut reference = state.reference(config);
     if let Err(fault) = state.check(config, &tip_velocity, reference.as_ref()) {
         state.latch_fault(controller, fault);

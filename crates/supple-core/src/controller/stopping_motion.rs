@@ -73,7 +73,7 @@ impl<const N: usize> StoppingMotion<N> {
             turned - turned.clamp(-resolution, resolution)
         });
         let velocity = certain_rad / elapsed_s;
-        let tip_velocity = terms.tip_velocity::<3>(&velocity);
+        let tip_velocity = terms.jacobian.fixed_rows::<3>(0) * velocity;
         is_moving(&config.limits, &velocity, &tip_velocity)
             && energy_j(&velocity) > ENERGY_GROWTH_LIMIT * self.allowed_j
     }

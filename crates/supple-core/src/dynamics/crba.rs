@@ -121,7 +121,7 @@ pub(super) fn mass_columns<const N: usize, const G: usize>(
 
 /// Returns the full symmetric matrix from its lower triangle.
 #[inline(always)]
-pub(super) fn symmetric<const N: usize, const G: usize>(columns: &Columns<N, G>) -> Matrix<N, N> {
+pub(crate) fn symmetric<const N: usize, const G: usize>(columns: &Columns<N, G>) -> Matrix<N, N> {
     let mut mass_matrix = Matrix::<N, N>::zeros();
     for j in 0..N {
         for i in j..N {

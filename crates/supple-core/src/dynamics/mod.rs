@@ -29,11 +29,12 @@ mod terms;
 pub use aba::aba;
 pub use coriolis::{coriolis, coriolis_matrix};
 pub use crba::crba;
+pub(crate) use crba::symmetric;
 pub use energy::{kinetic_energy, potential_energy};
 pub use kinematics::{jacobian, jacobian_dot_qd, joint_poses, tip_pose};
 pub use momentum::{Momentum, momentum};
 pub use regressor::{Regressor, parameters, regressor, regressor_rows, regressor_times};
 pub use rnea::{gravity, rnea};
 pub(crate) use sweep::Sweep;
-pub(crate) use terms::fill;
+
 pub use terms::{Terms, terms};

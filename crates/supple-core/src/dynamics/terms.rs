@@ -81,7 +81,7 @@ fn swept<const N: usize, const G: usize>(
 
 /// Fills `out` from a sweep. The function is inlined, so unused terms cost nothing.
 #[inline(always)]
-pub(crate) fn fill<const N: usize, const G: usize>(
+fn fill<const N: usize, const G: usize>(
     sweep: &Sweep<G>,
     arm: &Arm<N>,
     qd: &Vector<N>,

@@ -5,9 +5,9 @@ use super::impedance::{Effect, LawInput, TermField, TermSink, Tip, add_law_terms
 use super::target::Target;
 use super::task::{Task, count_active, square_task};
 use crate::config::Role;
-use crate::dynamics::{Sweep, Terms, fill};
-use crate::math::Vector;
+use crate::dynamics::{Sweep, symmetric};
 use crate::math::lanes::{in_groups, joint_values, per_joint};
+use crate::math::{Matrix, Vector};
 use crate::model::arm::Arm;
 use core::array::from_fn;
 
@@ -63,14 +63,15 @@ fn by_mass_matrix<T: Target<D>, const D: usize, const N: usize, const G: usize>(
     sweep: &Sweep<G>,
     input: &LawInput<'_, T, N, D>,
 ) -> Option<Vector<N>> {
-    let mut terms = Terms::default();
-    fill(sweep, arm, input.velocity_rad_per_s, &mut terms);
-    let task = Task::from_sweep(sweep, arm, roles)?;
+    let columns = sweep.mass(arm);
+    let task = Task::from_sweep(sweep, columns, roles)?;
     let bias = first(sweep.tip_bias_acceleration::<N>());
     let sum = TermSum::new(roles, &task, sweep, bias, input);
-    let inertial = terms.mass_matrix * (task.inverse * sum.acceleration);
+    let mass_matrix: Matrix<N, N> = symmetric(&columns);
+    let inertial = mass_matrix * (task.inverse * sum.acceleration);
     let force = task.jacobian.tr_mul(&sum.force);
-    Some(terms.coriolis_gravity + inertial + force + sum.torque)
+    let coriolis_gravity = Vector::from(per_joint(&sweep.projection().torque));
+    Some(coriolis_gravity + inertial + force + sum.torque)
 }
 
 /// Is not inlined: this branch is rare for three joints, and inlining it would slow down the common branch.

@@ -24,7 +24,6 @@ use crate::math::linalg::{
     Inverse3, first_rows, is_positive_definite_3, min_singular_value, singular_values_exceed,
 };
 use crate::math::{Matrix, Matrix3};
-use crate::model::arm::Arm;
 
 /// Smallest singular value of the active Jacobian below which the position's inverse is damped \[m\].
 pub const SINGULAR_BELOW_M: f64 = 0.18;
@@ -98,11 +97,11 @@ impl<const N: usize, const D: usize> Task<N, D> {
         in_groups!(N, from_terms[D](terms, roles))
     }
 
-    /// Returns the task of a swept arm, as [`Task::new`] and [`Task::of_pose`].
+    /// Returns the task of a swept arm with its mass matrix, as [`Task::new`] and [`Task::of_pose`].
     #[inline(always)]
     pub(crate) fn from_sweep<const G: usize>(
         sweep: &Sweep<G>,
-        arm: &Arm<N>,
+        mass_matrix: Columns<N, G>,
         roles: &[Role; N],
     ) -> Option<Task<N, D>> {
         // From the lanes, not from a matrix: a vector load of numbers that were just stored one by one stalls.
@@ -112,7 +111,7 @@ impl<const N: usize, const D: usize> Task<N, D> {
                 *x = entry(&sweep.motions[direction], joint);
             }
         }
-        Task::from_matrices(jacobian, sweep.mass(arm), roles)
+        Task::from_matrices(jacobian, mass_matrix, roles)
     }
 
     /// The task from the Jacobian of all joints and the columns of the mass matrix.
