@@ -1,4 +1,4 @@
-//! An arm and a pool of states as plain numbers, in the order in which `harness.hpp` reads them.
+//! Reads an arm and the states at which its functions are timed, plain numbers in the order in which `harness.hpp` reads them.
 
 use supple_benches::State;
 use supple_core::config::Gains;
@@ -34,7 +34,7 @@ impl From<std::io::Error> for CaseError {
     }
 }
 
-/// An arm, its task and its states.
+/// An arm, the gains of its impedance law, and the states at which its functions are timed.
 pub struct Case<const N: usize> {
     pub arm: Arm<N>,
     pub gains: Gains,
@@ -77,7 +77,7 @@ impl Reader<'_> {
         })
     }
 
-    fn pair(&mut self) -> Result<(Vector3<f64>, Vector3<f64>), CaseError> {
+    fn linear_and_angular(&mut self) -> Result<(Vector3<f64>, Vector3<f64>), CaseError> {
         Ok((self.vector()?, self.vector()?))
     }
 
@@ -102,8 +102,8 @@ impl Reader<'_> {
             self.vector()?,
         );
         let base_from_tip = self.pose()?;
-        let (velocity, angular_velocity_rad_per_s) = self.pair()?;
-        let (acceleration, angular_acceleration_rad_per_s2) = self.pair()?;
+        let (velocity, angular_velocity_rad_per_s) = self.linear_and_angular()?;
+        let (acceleration, angular_acceleration_rad_per_s2) = self.linear_and_angular()?;
         Ok(State {
             q,
             qd,
@@ -128,7 +128,7 @@ impl Reader<'_> {
 impl<const N: usize> Case<N> {
     pub fn new(numbers: &[f64]) -> Result<Case<N>, CaseError> {
         let mut r = Reader(numbers);
-        let [_joints, _task, states] = r.array()?;
+        let [_joints, _task_directions, state_count] = r.array()?;
         let gravity = r.vector()?;
         let mut joints = Vec::with_capacity(N);
         for _ in 0..N {
@@ -137,15 +137,15 @@ impl<const N: usize> Case<N> {
         let tip = r.pose()?;
         let joints: [Joint; N] = joints.try_into().map_err(|_| CaseError::Joints)?;
         let arm = Arm::new(&joints, tip, None, gravity).map_err(CaseError::Arm)?;
-        let (stiffness_n_per_m, stiffness_nm_per_rad) = r.pair()?;
-        let (damping_n_s_per_m, damping_nm_s_per_rad) = r.pair()?;
+        let (stiffness_n_per_m, stiffness_nm_per_rad) = r.linear_and_angular()?;
+        let (damping_n_s_per_m, damping_nm_s_per_rad) = r.linear_and_angular()?;
         let gains = Gains {
             stiffness_n_per_m,
             damping_n_s_per_m,
         };
         let pose_gains = PoseGains::diagonal(&gains, &stiffness_nm_per_rad, &damping_nm_s_per_rad);
         let nullspace_damping = r.number()?;
-        let states: Result<_, _> = (0..states as usize).map(|_| r.state()).collect();
+        let states: Result<_, _> = (0..state_count as usize).map(|_| r.state()).collect();
         Ok(Case {
             arm,
             gains,

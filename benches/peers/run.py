@@ -1,5 +1,5 @@
-"""Compiles the peers, alternates all programs, compares their outputs, and writes RESULTS.md,
-results.json and growth.svg. `run.sh` calls it."""
+"""Compiles the peers (Pinocchio and code that CasADi generates), runs them and ours alternately, compares their outputs, and
+writes RESULTS.md, results.json and growth.svg. `run.sh` calls it."""
 
 import argparse
 import importlib.metadata
@@ -16,7 +16,9 @@ import numpy as np
 import report
 
 HERE = pathlib.Path(__file__).parent
+# Number of task directions of each arm: 3 for the position law, 6 for the pose law.
 ARMS = {"wam3": 3, "wam4": 3, "wam7": 6}
+# Numbers of joints of the random arms, for the growth of the time with the joints.
 GROWTH = range(2, 13)
 TOLERANCE = 1e-9
 # Maximum load average, of one minute, of everything but this benchmark; and how long to wait for it, since
@@ -40,6 +42,7 @@ def compile_cpp(source, program, flags, depends):
 
 
 def pinocchio(folder):
+    """Compiles the program of Pinocchio."""
     prefix = next(folder.glob("python/lib/python*/site-packages/cmeel.prefix")) / "include"
     program = folder / "pinocchio"
     include = ["-isystem", str(prefix), "-isystem", str(prefix / "eigen3")]
@@ -48,6 +51,7 @@ def pinocchio(folder):
 
 
 def symbolic(folder, arm):
+    """Generates the C code of an arm by CasADi, and compiles it."""
     code, program = folder / f"{arm}.c", folder / f"symbolic_{arm}"
     subprocess.run(
         [sys.executable, HERE / "symbolic.py", folder / f"{arm}.txt", code], check=True
@@ -57,7 +61,10 @@ def symbolic(folder, arm):
 
 
 class Runner:
-    """Runs programs pinned to one core and keeps their outputs."""
+    """Runs a program pinned to one core; returns (function, {mode: (median, minimum)}) in ns, and the outputs.
+
+    Mode "dependent": each call needs the result of the last one; "independent": none does.
+    """
 
     def __init__(self, folder, core):
         self.folder, self.core = folder, core
@@ -69,6 +76,7 @@ class Runner:
         found = []
         for line in printed.splitlines():
             name, mode, median, minimum = line.split()
+            # The first mode of each function.
             if mode == "independent":
                 found.append((name, {}))
             found[-1][1][mode] = (float(median), float(minimum))
@@ -77,6 +85,7 @@ class Runner:
 
 def split(found, outputs, joints):
     """The outputs of each measured function, one row per state."""
+    # Ours alone: "law_apart", the law with every torque term apart; "step", a whole cycle of the controller.
     sizes = {
         "rnea": joints,
         "crba": joints**2,
@@ -101,7 +110,7 @@ def split(found, outputs, joints):
 def worst_difference(name, found, expected, joints):
     """Maximum difference, mixed absolute and relative; accelerations relative to the largest one."""
     if name == "crba":
-        # Pinocchio fills the upper triangle.
+        # Pinocchio fills only the upper triangle.
         column, row = np.divmod(np.arange(joints**2), joints)
         found, expected = found[:, row <= column], expected[:, row <= column]
     size = np.abs(expected)
@@ -127,8 +136,8 @@ def compare(arm, joints, ours, peer, label):
 
 
 def collect(rounds):
-    """Medians and minima of all rounds for each function and mode, of the faster variant if there are
-    two."""
+    """Medians and minima of all rounds for each function and mode. If a program measures a function in two
+    variants under one name, those of the faster one."""
     variants = [name for name, _ in rounds[0]]
     best = {}
     for variant, name in enumerate(variants):
@@ -170,7 +179,7 @@ def require_quiet(load_of_others, anyway):
 
 
 def wait_until_quiet(anyway):
-    """Waits for a quiet machine, which compiling has disturbed."""
+    """Waits until the load that compiling has caused has fallen; ends the program if it does not fall (except with `anyway`)."""
     until = time.monotonic() + QUIET_WAIT_S
     while load() > QUIET_LOAD and not anyway and time.monotonic() < until:
         time.sleep(5.0)
@@ -253,7 +262,7 @@ def main():
         growth[joints], _ = measure(run, programs, f"{name}.txt", name, joints, 3)
     print("random arms of 2 to 12 joints: measured, outputs agree")
 
-    # This benchmark is one of the programs that run.
+    # The load average includes this benchmark, which uses one core.
     after = load()
     require_quiet(after - 1.0, options.anyway)
     loads = f"{before:.2f} before, {after:.2f} after, which counts this benchmark as 1"

@@ -1,5 +1,5 @@
-//! Tests of complete systems with all client resources exhausted: the controller still serves the operator, and a second operator
-//! gets an error with a remedy.
+//! Tests of complete systems from the operator's side: idle is accepted although clients, files, memory or locks are missing, and
+//! the commands report each failure with its exit code and a remedy.
 
 use crate::running::{PREFIX, Up, json, stderr_of, supple, temporary_folder};
 use crate::support::programs;
@@ -48,7 +48,7 @@ fn wait_for_mode(reader: &mut TelemetryReader, mode: Mode) -> u64 {
 }
 
 /// Returns the newest cycle.
-fn now(reader: &mut TelemetryReader) -> u64 {
+fn newest_cycle(reader: &mut TelemetryReader) -> u64 {
     let mut cycle = reader
         .wait(TIMEOUT)
         .expect("read")
@@ -62,9 +62,9 @@ fn now(reader: &mut TelemetryReader) -> u64 {
 }
 
 #[test]
-fn idle_is_accepted_while_all_slots_the_queue_and_the_lock_are_taken() {
+fn idle_is_accepted_while_all_slots_a_queue_quota_and_the_lock_are_taken() {
     let (up, domain, mut reader) = tracking();
-    // Hung clients occupy all slots, and requests fill the queue.
+    // Clients occupy all slots; one sends more requests for a cycle that never comes than the queue holds of one operator.
     let readers: Vec<_> = (0..20)
         .map_while(|_| TelemetryReader::new(&domain).ok())
         .collect();
@@ -85,14 +85,14 @@ fn idle_is_accepted_while_all_slots_the_queue_and_the_lock_are_taken() {
         "{}",
         stderr_of(&refused)
     );
-    // A process was stopped while it held the membership lock.
+    // This test holds the membership lock, as a process does that is suspended while it joins.
     let lock = domain.folder().join(format!("{PREFIX}.membership.lock"));
     let lock = std::fs::File::open(lock).expect("a lock");
     flock(&lock, FlockOperation::LockExclusive).expect("locked");
 
     let mut quickest = u64::MAX;
     for _ in 0..ATTEMPTS {
-        let requested_cycle = now(&mut reader);
+        let requested_cycle = newest_cycle(&mut reader);
         let answer = request_idle(&domain, TIMEOUT)
             .expect("requested")
             .expect("an answer");
@@ -104,7 +104,7 @@ fn idle_is_accepted_while_all_slots_the_queue_and_the_lock_are_taken() {
         wait_for_mode(&mut reader, Mode::Idle);
         busy.send::<4>(&Request::GravityHold, None)
             .expect("sent")
-            .expect("the queue has space");
+            .expect("a controller that receives it");
         wait_for_mode(&mut reader, Mode::GravityHold);
     }
     assert!(quickest <= IDLE_WITHIN_CYCLES, "{quickest} cycles");
@@ -119,7 +119,7 @@ fn idle_is_accepted_while_all_slots_the_queue_and_the_lock_are_taken() {
 }
 
 #[test]
-fn a_system_in_a_fault_is_code_5() {
+fn commands_exit_with_code_5_during_a_fault() {
     let (up, _domain, mut reader) = tracking();
     // No arm states arrive, so that the controller enters a fault.
     let sim = up.child("supple-sim");
@@ -143,7 +143,7 @@ fn a_system_in_a_fault_is_code_5() {
     assert_eq!(output.status.code(), Some(5), "{}", stderr_of(&output));
 }
 
-/// Another program has replaced the file of the socket: idle is requested as any other mode.
+/// Another program has replaced the file of the idle socket: `supple mode idle` sends an operator request, as for other modes.
 #[test]
 fn idle_is_accepted_without_its_socket() {
     let (up, domain, mut reader) = tracking();
@@ -151,10 +151,10 @@ fn idle_is_accepted_without_its_socket() {
     std::fs::remove_file(&socket).expect("removed");
     std::fs::write(&socket, "other").expect("written");
     let output = up.run(&["mode", "idle"]);
-    let words = stderr_of(&output);
-    assert!(output.status.success(), "{words}");
+    let message = stderr_of(&output);
+    assert!(output.status.success(), "{message}");
     for part in ["warning", ".idle.socket", "does not answer"] {
-        assert!(words.contains(part), "{part}: {words}");
+        assert!(message.contains(part), "{part}: {message}");
     }
     wait_for_mode(&mut reader, Mode::Idle);
 }
@@ -167,13 +167,13 @@ fn commands_use_the_arm_of_the_running_system() {
     assert!(tracked.status.success(), "{}", stderr_of(&tracked));
     for command in [&["track", "arc"][..], &["probe"]] {
         let other = up.run(&[command, &["--arm", "wam4"]].concat());
-        let words = stderr_of(&other);
-        assert_eq!(other.status.code(), Some(3), "{words}");
+        let message = stderr_of(&other);
+        assert_eq!(other.status.code(), Some(3), "{message}");
         for part in ["has 4 joints", "running system has 3 joints", "--arm wam3"] {
-            assert!(words.contains(part), "{part}: {words}");
+            assert!(message.contains(part), "{part}: {message}");
         }
     }
-    // As many joints, of other names.
+    // An arm with the same number of joints, one of which has another name.
     let folder = tempfile::tempdir().expect("a folder");
     let copy = folder.path().join("copy");
     let copy = copy.to_str().expect("UTF-8");
@@ -184,18 +184,18 @@ fn commands_use_the_arm_of_the_running_system() {
         std::fs::write(&path, text.replace("joint1", "shoulder")).expect("written");
     }
     let other = up.run(&["track", "arc", "--arm", copy]);
-    let words = stderr_of(&other);
-    assert_eq!(other.status.code(), Some(3), "{words}");
+    let message = stderr_of(&other);
+    assert_eq!(other.status.code(), Some(3), "{message}");
     for part in [
         "the joints shoulder, ",
         "has the joints joint1, ",
         "--arm wam3",
     ] {
-        assert!(words.contains(part), "{part}: {words}");
+        assert!(message.contains(part), "{part}: {message}");
     }
 }
 
-/// A program that cleans /tmp has removed the files with which the system is stopped: they are created again.
+/// A program that cleans /tmp has removed the files that `supple mode idle` and `supple stop` need: they are created again.
 #[test]
 fn removed_files_of_a_running_system_are_created_again() {
     let (mut up, domain, _) = tracking();
@@ -219,7 +219,7 @@ fn removed_files_of_a_running_system_are_created_again() {
     assert!(files.iter().all(|file| !file.exists()), "no file is left");
 }
 
-/// A stopped controller does not answer: the message contains the reaction of the arm and a remedy.
+/// A controller that SIGSTOP suspends does not answer: the message contains the reaction of the arm and a remedy.
 #[test]
 fn the_error_of_an_unanswered_idle_request_describes_the_reaction_of_the_drives() {
     let (up, ..) = tracking();
@@ -227,8 +227,8 @@ fn the_error_of_an_unanswered_idle_request_describes_the_reaction_of_the_drives(
     kill_process(controller, Signal::STOP).expect("it runs");
     let output = up.run(&["mode", "idle"]);
     kill_process(controller, Signal::CONT).expect("it runs");
-    let words = stderr_of(&output);
-    assert_eq!(output.status.code(), Some(10), "{words}");
+    let message = stderr_of(&output);
+    assert_eq!(output.status.code(), Some(10), "{message}");
     for part in [
         "does not answer",
         "10 ms",
@@ -236,9 +236,10 @@ fn the_error_of_an_unanswered_idle_request_describes_the_reaction_of_the_drives(
         "emergency stop",
         "supple stop",
     ] {
-        assert!(words.contains(part), "{part}: {words}");
+        assert!(message.contains(part), "{part}: {message}");
     }
-    assert!(!words.contains("start one"), "{words}");
+    // That would be the remedy if no system were running.
+    assert!(!message.contains("start one"), "{message}");
 }
 
 #[test]
@@ -284,7 +285,7 @@ fn concurrent_starts_leave_exactly_one_system_running() {
     }
 }
 
-/// Runs a script in its own mount namespace with a small /dev/shm; `None` if the system does not permit namespaces.
+/// Runs a script in its own mount namespace with a small /dev/shm; `None` if the host does not permit namespaces.
 fn with_shared_memory(size: &str, script: &str, folder: &Path) -> Option<Output> {
     let mount = format!("mount -t tmpfs -o size={size} tmpfs /dev/shm");
     let in_namespace = |script: &str| {

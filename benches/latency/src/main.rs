@@ -1,5 +1,5 @@
-//! Measures a running system, or a bare echo at the same rate, and prints all times as JSON. `run.sh`
-//! alternates it with cyclictest.
+//! Starts and measures one of three: a system, its messages alone, or an echo of datagrams, all at the same rate; prints all
+//! times as JSON. `run.sh` alternates it with cyclictest.
 
 mod common;
 mod echo;
@@ -29,7 +29,7 @@ enum What {
         #[command(flatten)]
         common: Common,
     },
-    /// Two processes that exchange Unix datagrams of the same sizes.
+    /// Two processes that exchange Unix datagrams of the sizes of a system's messages.
     Echo {
         #[command(flatten)]
         common: Common,
@@ -39,13 +39,13 @@ enum What {
         #[command(flatten)]
         common: Common,
     },
-    /// The replying process of the messages.
+    /// The replying process of `messages`, which starts it.
     #[command(hide = true)]
     Answer {
         #[command(flatten)]
         common: Common,
     },
-    /// The replying process of the echo, with the socket as standard input.
+    /// The replying process of `echo`, which starts it with the socket as standard input.
     #[command(hide = true)]
     Reflect {
         #[command(flatten)]

@@ -2,14 +2,15 @@
 //!
 //! The socket receives echoes of its own frames (a frame counts as sent only when the driver confirms it), all error
 //! frames, and a count of the frames that were lost because they were not read in time (`SO_RXQ_OVFL`). It carries
-//! classic CAN frames, and CAN FD frames if the interface carries them; it ignores remote requests. Bit rates and automatic restart are properties of the interface, set when it is brought up:
+//! classic CAN frames, and CAN FD frames if the interface carries them; it ignores remote requests. Bit rates and automatic restart
+//! after bus-off are properties of the interface, set when it is brought up:
 //! `ip link set can0 up type can bitrate 1000000 restart-ms 100`, for CAN FD with `dbitrate 5000000 fd on`.
 
 use crate::bus::{Bus, BusFault, Event};
 use crate::can_frame::{DecodedFrame, EncodedFrame, FD_FRAME_BYTES};
 use crate::error::BusError;
 use crate::wait::wait_readable_until;
-use nix::sys::socket::{self as kernel, ControlMessageOwned, MsgFlags, setsockopt};
+use nix::sys::socket::{self as nix_socket, ControlMessageOwned, MsgFlags, setsockopt};
 use rustix::fd::{AsFd, AsRawFd, BorrowedFd};
 use rustix::io::{Errno, IoSliceMut};
 use rustix::net::{RecvAncillaryBuffer, RecvFlags, ReturnFlags, recvmsg, sockopt};
@@ -33,13 +34,14 @@ pub struct SocketCan {
     interface: String,
     /// Whether the interface carries FD frames.
     fd: bool,
-    /// Whether an overrun has occurred; from then on the kernel attaches its counter to every frame.
-    overrun_counting: bool,
+    /// Whether the kernel attaches its counter of lost frames: to every frame after the first loss.
+    counter_attached: bool,
     /// Number of frames lost.
     lost: u64,
     /// Counter of lost frames as the kernel last reported it; it wraps.
     lost_by_kernel: u32,
-    control: Vec<u8>,
+    /// Buffer for the attached counter.
+    ancillary_buffer: Vec<u8>,
 }
 
 impl SocketCan {
@@ -59,7 +61,7 @@ impl SocketCan {
             socket.set_error_filter_accept_all()?;
             socket.set_nonblocking(true)?;
             sockopt::set_socket_recv_buffer_size(&socket, RECEIVE_BUFFER_BYTES)?;
-            setsockopt(&socket, kernel::sockopt::RxqOvfl, &1)?;
+            setsockopt(&socket, nix_socket::sockopt::RxqOvfl, &1)?;
             Ok(())
         };
         set_up().map_err(refused)?;
@@ -67,10 +69,10 @@ impl SocketCan {
             socket,
             interface: interface.to_owned(),
             fd: carries_fd(interface),
-            overrun_counting: false,
+            counter_attached: false,
             lost: 0,
             lost_by_kernel: 0,
-            control: nix::cmsg_space!(u32),
+            ancillary_buffer: nix::cmsg_space!(u32),
         })
     }
 
@@ -80,7 +82,7 @@ impl SocketCan {
         self.lost
     }
 
-    /// Sends an error frame to the other sockets of this machine, if the interface supports it, as `vcan` does.
+    /// Sends the error frame of an emulated arm to the other sockets of this machine, if the interface supports it, as `vcan` does.
     ///
     /// # Errors
     /// If the kernel rejects it.
@@ -90,14 +92,14 @@ impl SocketCan {
             .map_err(BusError::io("sending an error frame to the CAN interface"))
     }
 
-    /// Returns whether frames were lost before the next frame.
+    /// Peeks at the counter attached to the next frame; returns whether frames were lost before that frame.
     fn detect_overrun(&mut self) -> Result<bool, BusError> {
         let mut raw = [0; FD_FRAME_BYTES];
         let mut buffers = [IoSliceMut::new(&mut raw)];
-        let peeked = kernel::recvmsg::<()>(
+        let peeked = nix_socket::recvmsg::<()>(
             self.socket.as_raw_fd(),
             &mut buffers,
-            Some(&mut self.control),
+            Some(&mut self.ancillary_buffer),
             MsgFlags::MSG_PEEK | MsgFlags::MSG_DONTWAIT,
         );
         let failed = |errno: nix::Error| BusError::Io {
@@ -109,8 +111,8 @@ impl SocketCan {
             Err(nix::Error::EAGAIN | nix::Error::EINTR) => return Ok(false),
             Err(errno) => return Err(failed(errno)),
         };
-        for control in message.cmsgs().map_err(failed)? {
-            if let ControlMessageOwned::RxqOvfl(count) = control {
+        for ancillary in message.cmsgs().map_err(failed)? {
+            if let ControlMessageOwned::RxqOvfl(count) = ancillary {
                 let more = count.wrapping_sub(self.lost_by_kernel);
                 self.lost += u64::from(more);
                 self.lost_by_kernel = count;
@@ -122,7 +124,7 @@ impl SocketCan {
 
     fn read_event(&mut self) -> Result<Option<Event>, BusError> {
         loop {
-            if self.overrun_counting && self.detect_overrun()? {
+            if self.counter_attached && self.detect_overrun()? {
                 return Ok(Some(Event::Fault(BusFault::Overrun)));
             }
             let mut raw = [0; FD_FRAME_BYTES];
@@ -138,8 +140,8 @@ impl SocketCan {
                 Err(Errno::INTR) => continue,
                 Err(errno) => return Err(BusError::io("receiving from the CAN interface")(errno)),
             };
-            // This read had no buffer for the counter; the next read has one.
-            self.overrun_counting |= message.flags.contains(ReturnFlags::CTRUNC);
+            // Truncated: this read has no buffer for the counter, so a peek with one precedes each later read.
+            self.counter_attached |= message.flags.contains(ReturnFlags::CTRUNC);
             match DecodedFrame::decode(&raw[..message.bytes]) {
                 DecodedFrame::Data(frame) if message.flags.bits() & CONFIRM != 0 => {
                     return Ok(Some(Event::Sent(frame)));

@@ -1,4 +1,4 @@
-"""Checks of arguments: every error names the argument, the expected value and the given value.
+"""Checks of arguments: each returns its argument, or raises an error with its name, the expected value and the given value.
 
 An argument of the wrong type raises a TypeError, one with a value out of range a ValueError. Neither text nor ``bool``
 counts as a number.
@@ -24,7 +24,7 @@ T = TypeVar("T")
 
 _SHORT = reprlib.Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
-_NO_NUMBER = (str, bytes, bytearray, bool, np.bool_)
+_NOT_NUMBERS = (str, bytes, bytearray, bool, np.bool_)
 
 
 def wrong(name: str, expected: str, value: object) -> TypeError:
@@ -36,7 +36,7 @@ def wrong(name: str, expected: str, value: object) -> TypeError:
 
 def number(name: str, value: float, *, positive: bool = False, signed: bool = False) -> float:
     """Returns a finite number of zero or more; with ``positive`` above zero, with ``signed`` of either sign."""
-    if isinstance(value, _NO_NUMBER) or getattr(value, "ndim", 0) != 0:
+    if isinstance(value, _NOT_NUMBERS) or getattr(value, "ndim", 0) != 0:
         raise wrong(name, "a number", value)
     try:
         found = float(value)
@@ -52,7 +52,7 @@ def number(name: str, value: float, *, positive: bool = False, signed: bool = Fa
 
 def integer(name: str, value: int, *, least: int = 0, limit: int = 2**64) -> int:
     """Returns an integer of ``least`` or more and below ``limit``."""
-    if isinstance(value, _NO_NUMBER):
+    if isinstance(value, _NOT_NUMBERS):
         raise wrong(name, "an integer", value)
     try:
         found = operator.index(value)
@@ -75,14 +75,14 @@ def iterable(name: str, values: Iterable[T]) -> Iterable[T]:
 
 
 def integers(name: str, values: Iterable[int]) -> list[int]:
-    """Returns integers, each zero or more."""
+    """Returns the integers, each zero or more, as a list."""
     if isinstance(values, (str, bytes)):
         raise wrong(name, "integers", values)
     return [integer(f"{name}[{i}]", value) for i, value in enumerate(iterable(name, values))]
 
 
 def array(name: str, values: ArrayLike, shape: tuple[int, ...] | None = None) -> NDArray[np.float64]:
-    """Returns the numbers as an array; ``shape``, if given, is the required shape."""
+    """Returns the numbers, finite or not, as an array; ``shape``, if given, is the required shape."""
     try:
         found = np.asarray(values)
     except ValueError as error:
@@ -105,14 +105,14 @@ def named_numbers(name: str, values: Mapping[str, float]) -> dict[str, float]:
 
 
 def flag(name: str, value: bool) -> bool:
-    """Returns True or False."""
+    """Returns a value that is True or False."""
     if not isinstance(value, (bool, np.bool_)):
         raise wrong(name, "True or False", value)
     return bool(value)
 
 
 def text(name: str, value: str) -> str:
-    """Returns a text."""
+    """Returns a value that is text."""
     if not isinstance(value, str):
         raise wrong(name, "text", value)
     return value
@@ -130,19 +130,19 @@ def path(name: str, value: str | os.PathLike[str], expected: str = "a path") -> 
 
 
 def instance(name: str, value: T, kind: type[T]) -> T:
-    """Returns an object of the class ``kind``."""
+    """Returns a value that is an instance of ``kind``."""
     if not isinstance(value, kind):
         raise wrong(name, f"{'an' if kind.__name__[0] in 'AEIOU' else 'a'} {kind.__name__}", value)
     return value
 
 
 def function(name: str, value: Callable[P, R], expected: str = "a callable") -> Callable[P, R]:
-    """Returns a callable."""
+    """Returns a value that is callable."""
     if not callable(value):
         raise wrong(name, expected, value)
     return value
 
 
 def arm(name: str, value: _native.Arm) -> _native.Arm:
-    """Returns an arm."""
+    """Returns a value that is an arm."""
     return instance(name, value, _native.Arm)

@@ -4,11 +4,11 @@
 //! The controller may be faulty, or not the expected program. The guard uses only the arm's limits
 //! and the encoder readings:
 //!
-//! - a torque that is not finite counts as a missing command;
+//! - a torque that is not finite becomes zero (the plant loop counts such a command as missing beforehand);
 //! - torque and torque rate are limited again;
 //! - drives become active only in gravity hold;
 //! - a joint at twice its speed limit ends the torque;
-//! - in a fault, a joint that still moves after 0.25 s, or that accelerates, ends the torque.
+//! - while the controller reports a fault, a joint that still moves after 0.25 s, or that accelerates, ends the torque.
 //!
 //! The guard latches nothing: its caller ends the torque at the first reason and decides when torque may
 //! return (`supple-drive/src/guard.rs`).
@@ -34,7 +34,7 @@ const STOP_TIMEOUT_S: f64 = 0.25;
 const ESTIMATOR_SETTLING_S: f64 = 0.02;
 /// Ratio to the speed before the fault above which a joint counts as accelerating.
 const SPEED_GROWTH_LIMIT: f64 = 1.25;
-/// Time in which a stop or a fallback torque may ramp a joint from full torque to zero \[s\].
+/// Time in which the torque of a safe action or the fallback torque may ramp a joint from full torque to zero \[s\].
 const STOP_TORQUE_S: f64 = 0.005;
 
 /// Reason for which the guard ended the torque.
@@ -49,7 +49,7 @@ pub enum GuardReason {
         /// Limit \[rad/s\].
         limit_rad_per_s: f64,
     },
-    /// In a fault of the controller, a joint still moves or accelerates.
+    /// While the controller reports a fault, a joint still moves or accelerates.
     NotStopped {
         /// Joint index.
         joint: usize,
@@ -106,7 +106,7 @@ pub struct DriveCommand<const N: usize> {
     pub torque_nm: Vector<N>,
     /// The controller's mode, if known.
     pub mode: Option<Mode>,
-    /// The controller is in a fault.
+    /// Whether the controller reports a fault.
     pub fault: bool,
 }
 
@@ -122,11 +122,12 @@ pub struct DriveGuard<const N: usize> {
     estimator: Option<Estimator<N>>,
     /// Last torque sent \[N m\].
     last_nm: Vector<N>,
-    /// Time since the controller's fault \[s\]; `None` without a fault.
+    /// Time since the controller first reported its fault \[s\]; `None` without a fault.
     fault_s: Option<f64>,
     /// Joint speeds before the fault \[rad/s\].
     speed_before_fault_rad_per_s: Vector<N>,
-    was_active: bool,
+    /// Whether the drives were active in the last cycle and their activation was accepted.
+    activation_accepted: bool,
 }
 
 impl<const N: usize> DriveGuard<N> {
@@ -142,7 +143,7 @@ impl<const N: usize> DriveGuard<N> {
             last_nm: Vector::zeros(),
             fault_s: None,
             speed_before_fault_rad_per_s: Vector::zeros(),
-            was_active: false,
+            activation_accepted: false,
         }
     }
 
@@ -180,17 +181,17 @@ impl<const N: usize> DriveGuard<N> {
         command: Option<&DriveCommand<N>>,
         active: bool,
     ) -> Result<(), GuardReason> {
-        let activated = active && !self.was_active;
-        self.was_active = active;
+        let activated = active && !self.activation_accepted;
+        self.activation_accepted = active;
         if !active {
             self.fault_s = None;
             return Ok(());
         }
         if activated {
             let mode = command.map(|command| command.mode);
-            // Without an answer the mode check is deferred to the first answer.
-            self.was_active = mode == Some(Some(Mode::GravityHold));
-            if mode.is_some() && !self.was_active {
+            // Without an answer the activation is neither accepted nor rejected until the first answer.
+            self.activation_accepted = mode == Some(Some(Mode::GravityHold));
+            if mode.is_some() && !self.activation_accepted {
                 return Err(GuardReason::NotInGravityHold);
             }
         }
@@ -242,10 +243,10 @@ impl<const N: usize> DriveGuard<N> {
         }
     }
 
-    /// Returns the torque with magnitude and rate limited; a torque that is not finite becomes zero. With `stopping`
-    /// (fallback or fault) the rate limit is higher.
-    pub fn limited_nm(&mut self, torque_nm: &Vector<N>, stopping: bool) -> Vector<N> {
-        let rate = if stopping {
+    /// Returns the torque with magnitude and rate limited; a torque that is not finite becomes zero. With `fast_ramp`
+    /// (fallback torque or safe action) the rate limit is higher.
+    pub fn limited_nm(&mut self, torque_nm: &Vector<N>, fast_ramp: bool) -> Vector<N> {
+        let rate = if fast_ramp {
             Vector::from_fn(|i, _| {
                 let fast = self.limits.joint_torque_nm[i] / STOP_TORQUE_S;
                 fast.max(self.limits.torque_rate_nm_per_s[i])

@@ -35,27 +35,27 @@ fn stiffness<const N: usize>(rig: &Rig<N>) -> Matrix<N, N> {
     (slope + slope.transpose()) * 0.5
 }
 
-/// Maximum increase in stiffness from `before` to `after` over many directions of the active
-/// joints, and for each held joint. (Held joints move the tip, but the law does not actuate them:
-/// this coupling is not symmetric, and its symmetric part has no meaning.)
-fn stiffer_by(roles: &[Role; 4], before: &Matrix<4, 4>, after: &Matrix<4, 4>) -> f64 {
-    let gained = after - before;
+/// Maximum increase in stiffness from `before` to `after`: in many directions of the active joints, and of
+/// each held joint alone. Entries between active and held joints are omitted: a held joint moves the tip, so
+/// that the law's torque changes on the active joints, but not the reverse.
+fn max_increase(roles: &[Role; 4], before: &Matrix<4, 4>, after: &Matrix<4, 4>) -> f64 {
+    let increase = after - before;
     let held = |i: usize| roles[i] != Role::Active;
-    let mut worst = f64::MIN;
+    let mut max = f64::MIN;
     for i in (0..4).filter(|i| held(*i)) {
-        worst = worst.max(gained[(i, i)]);
+        max = max.max(increase[(i, i)]);
     }
     let mut random = Random::new(1);
     for _ in 0..2000 {
         let direction = random.joints::<4>(1.0);
         let direction = Vector::<4>::from_fn(|i, _| if held(i) { 0.0 } else { direction[i] });
         let direction = direction / direction.norm();
-        worst = worst.max(direction.dot(&(gained * direction)));
+        max = max.max(direction.dot(&(increase * direction)));
     }
-    worst
+    max
 }
 
-/// Losses, each as a change of the inputs of one cycle and all that follow.
+/// A loss: its name, and a function that loses inputs of some cycles. Later inputs are complete.
 type Loss = (&'static str, fn(&mut Rig<4>));
 
 fn cycle_with(rig: &mut Rig<4>, change: impl Fn(&mut Input<4>)) {
@@ -86,13 +86,13 @@ const LOSSES: [Loss; 8] = [
             input.tip_force_n = Some(Vector3::repeat(f64::NAN))
         });
     }),
-    ("states for a while", |rig| rig.cycle += 50),
-    ("the clock", |rig| {
+    ("the states of 50 cycles", |rig| rig.cycle += 50),
+    ("the advance of the cycle number", |rig| {
         for _ in 0..10 {
             cycle_with(rig, |input| input.cycle -= 1);
         }
     }),
-    ("the peer, and another came", |rig| {
+    ("the plant, which starts anew at cycle 3", |rig| {
         cycle_with(rig, |input| input.cycle = 3);
     }),
 ];
@@ -109,16 +109,16 @@ fn no_lost_input_increases_the_stiffness_in_any_mode() {
             let mut rig = rig.clone();
             lose(&mut rig);
             let after = stiffness(&rig);
-            let gained = stiffer_by(&config.roles, &before, &after);
+            let increase = max_increase(&config.roles, &before, &after);
             assert!(
-                gained < 1e-3,
-                "{gained} N m/rad stiffer in {mode:?} after losing {what}: {before} {after}"
+                increase < 1e-3,
+                "{increase} N m/rad stiffer in {mode:?} after losing {what}: {before} {after}"
             );
         }
     }
 }
 
-/// Track: `J^T K J` and the roll's loop only; hold: the roll's loop alone.
+/// Idle: none. Gravity hold: the loop of the held shoulder roll. Track: that and `J^T K J`. Move: the loops of all joints.
 #[test]
 fn stiffness_in_each_mode_is_as_documented() {
     let mut config = four();
@@ -139,8 +139,7 @@ fn stiffness_in_each_mode_is_as_documented() {
     j.column_mut(2).fill(0.0);
     let spring = j.transpose() * j * 100.0;
     let found = in_mode(Mode::Track);
-    // The roll joint moves the tip as well: for the other joints this is a coupling, not a
-    // stiffness.
+    // Only entries of two active joints: the held roll also moves the tip, but the law does not actuate it.
     for (a, b) in [(0, 0), (0, 1), (1, 1), (1, 3), (3, 3), (0, 3)] {
         let error = (found - spring - roll)[(a, b)].abs();
         assert!(error < 1e-3, "entry {a}, {b} is {error} off");
@@ -166,17 +165,17 @@ fn a_lost_reply_opens_the_loop_of_its_joint() {
     assert_eq!(torque(bent::<4>()[1]), torque(bent::<4>()[1] + 0.1));
 }
 
-/// Apparent stiffness: the force that keeps the tip displaced at rest, per displacement.
+/// Apparent stiffness in `Track`: external force on the tip per displacement of the tip, once at rest.
 fn apparent_stiffness(config: Config<3>, sensor: bool) -> Matrix3<f64> {
-    let settle = |push_n: Vector3<f64>| -> Vector3<f64> {
+    let settled_tip = |push_n: Vector3<f64>| -> Vector3<f64> {
         let mut rig = Rig::holding(config, bent());
         rig.force_n = sensor.then_some(Vector3::zeros());
         rig.accept(rig.hold_tip_request());
         let mut plant = Plant::at_rest(config.arm, bent());
         for k in 0..6000 {
-            let grown = push_n * (f64::from(k) / 1000.0).min(1.0);
-            rig.force_n = sensor.then_some(grown);
-            let output = rig.drive(&mut plant, None, |arm, q, _| push(arm, q, &grown));
+            let pushing_n = push_n * (f64::from(k) / 1000.0).min(1.0);
+            rig.force_n = sensor.then_some(pushing_n);
+            let output = rig.drive(&mut plant, None, |arm, q, _| push(arm, q, &pushing_n));
             assert_eq!(output.fault, None);
         }
         supple_core::dynamics::tip_pose(&config.arm, &plant.q).translation
@@ -185,7 +184,7 @@ fn apparent_stiffness(config: Config<3>, sensor: bool) -> Matrix3<f64> {
     for axis in 0..3 {
         let mut force = Vector3::zeros();
         force[axis] = 0.5;
-        let displacement = settle(force) - settle(-force);
+        let displacement = settled_tip(force) - settled_tip(-force);
         compliance.set_column(axis, &displacement);
     }
     crate::support::inverse(&compliance)
@@ -202,19 +201,19 @@ fn losing_the_force_sensor_keeps_the_stiffness() {
         config.law.inertia = ApparentInertia::Chosen(Matrix3::from_diagonal_element(mass_kg));
         let with = apparent_stiffness(config, true);
         let without = apparent_stiffness(config, false);
-        let [.., gained] = symmetric_eigenvalues(&(without - with));
+        let [.., increase] = symmetric_eigenvalues(&(without - with));
         assert!(
-            gained < 0.01 * 100.0,
-            "{gained} N/m stiffer at {mass_kg} kg"
+            increase < 0.01 * 100.0,
+            "{increase} N/m stiffer at {mass_kg} kg"
         );
         let expected = Matrix3::from_diagonal_element(100.0);
         assert!(size(&(with - expected)) < 1.0, "{with}");
     }
 }
 
-/// A fault during a move removes the stiff loops.
+/// `Mode::Move` holds the active joints in stiff position loops too: a fault opens them.
 #[test]
-fn a_fault_in_a_move_removes_the_stiff_loops() {
+fn a_fault_in_a_move_opens_the_position_loops() {
     let mut config = four();
     unlimited(&mut config);
     assert_eq!(config.roles[2], held(0.0));

@@ -1,4 +1,4 @@
-//! Identities between the functions, on random arms.
+//! Identities between the functions of `supple_core::dynamics`, on random arms.
 
 use crate::common::numeric::{scalar, size};
 use crate::common::random::Case;
@@ -23,14 +23,14 @@ pub fn torque_scale<const N: usize>(case: &Case<N>, arm: &Arm<N>) -> f64 {
 for_arms_of_3_4_and_7_joints!(
     mass_matrix_is_symmetric_and_positive_definite,
     inverse_dynamics_is_the_sum_of_its_parts,
-    inverse_dynamics_specialises,
+    inverse_dynamics_without_acceleration_or_velocity,
     forward_dynamics_inverts_inverse_dynamics,
     coriolis_torque_is_the_matrix_times_the_velocity,
     kinetic_energy_is_half_the_momentum_times_the_velocity,
-    momentum_and_its_drift,
+    momentum_and_the_gradient_of_the_kinetic_energy,
     regressor_is_linear_in_the_parameters,
-    terms_are_the_separate_functions,
-    terms_overwrite_what_was_there,
+    terms_are_the_results_of_the_separate_functions,
+    terms_do_not_depend_on_the_previous_content,
 );
 
 fn mass_matrix_is_symmetric_and_positive_definite<const N: usize>(case: &Case<N>) -> Outcome {
@@ -58,21 +58,21 @@ fn inverse_dynamics_is_the_sum_of_its_parts<const N: usize>(case: &Case<N>) -> O
     Ok(())
 }
 
-fn inverse_dynamics_specialises<const N: usize>(case: &Case<N>) -> Outcome {
+fn inverse_dynamics_without_acceleration_or_velocity<const N: usize>(case: &Case<N>) -> Outcome {
     let (arm, q, qd) = (case.arm(), &case.q, &case.qd);
     let (zero, scale) = (Vector::zeros(), torque_scale(case, &arm));
     let bias = coriolis(&arm, q, qd) + gravity(&arm, q);
     prop_close!(rnea(&arm, q, qd, &zero), bias, scale, 1e-13);
     prop_close!(rnea(&arm, q, &zero, &zero), gravity(&arm, q), scale, 1e-13);
     prop_close!(coriolis(&arm, q, &zero), zero, scale, 1e-13);
-    // Velocity products are quadratic.
+    // The Coriolis and centrifugal torque is quadratic in the velocity.
     let doubled = coriolis(&arm, q, &(qd * 2.0));
     prop_close!(doubled, coriolis(&arm, q, qd) * 4.0, scale, 1e-13);
     Ok(())
 }
 
-/// Backward error: inverse dynamics of the result gives the input torque. Forward error: the result
-/// agrees with the mass matrix as far as its condition allows.
+/// Backward error: inverse dynamics of the result gives the input torque. Forward error: the result agrees
+/// with the Cholesky solution as far as the condition number permits. The random `qdd` serves as torque.
 fn forward_dynamics_inverts_inverse_dynamics<const N: usize>(case: &Case<N>) -> Outcome {
     let (arm, q, qd) = (case.arm(), &case.q, &case.qd);
     let tau = case.qdd;
@@ -119,21 +119,21 @@ fn kinetic_energy_is_half_the_momentum_times_the_velocity<const N: usize>(
     Ok(())
 }
 
-fn momentum_and_its_drift<const N: usize>(case: &Case<N>) -> Outcome {
+fn momentum_and_the_gradient_of_the_kinetic_energy<const N: usize>(case: &Case<N>) -> Outcome {
     let (arm, q, qd) = (case.arm(), &case.q, &case.qd);
     let scale = torque_scale(case, &arm);
     let found = momentum(&arm, q, qd);
     prop_close!(found.momentum, crba(&arm, q) * qd, scale, 1e-13);
-    let drift = coriolis_matrix(&arm, q, qd).transpose() * qd;
-    prop_close!(found.kinetic_gradient, drift, scale, 1e-13);
+    let gradient = coriolis_matrix(&arm, q, qd).transpose() * qd;
+    prop_close!(found.kinetic_gradient, gradient, scale, 1e-13);
     Ok(())
 }
 
 fn regressor_is_linear_in_the_parameters<const N: usize>(case: &Case<N>) -> Outcome {
     let (arm, q, qd, qdd) = (case.arm(), &case.q, &case.qd, &case.qdd);
     let rows = regressor(&arm, q, qd, qdd);
-    let links = regressor_times(&rows, &parameters(&arm));
-    let expected = links + case.armature().component_mul(qdd);
+    let without_rotors = regressor_times(&rows, &parameters(&arm));
+    let expected = without_rotors + case.armature().component_mul(qdd);
     prop_close!(
         rnea(&arm, q, qd, qdd),
         expected,
@@ -141,22 +141,22 @@ fn regressor_is_linear_in_the_parameters<const N: usize>(case: &Case<N>) -> Outc
         1e-13
     );
     for (i, row) in rows.iter().enumerate() {
-        // A link loads no joint after it.
+        // The torque of a joint does not depend on the links before it.
         prop_assert!(row[..i].iter().all(|y| *y == Vector::<10>::zeros()));
     }
 
-    // The regressor does not depend on the bodies.
-    let mut others = case.clone();
-    others.tool = None;
-    for joint in &mut others.joints {
+    // The regressor does not depend on the inertial parameters.
+    let mut other_bodies = case.clone();
+    other_bodies.tool = None;
+    for joint in &mut other_bodies.joints {
         joint.body.mass_kg *= 3.0;
         joint.body.com_m *= -0.5;
     }
-    prop_assert_eq!(rows, regressor(&others.arm(), q, qd, qdd));
+    prop_assert_eq!(rows, regressor(&other_bodies.arm(), q, qd, qdd));
     Ok(())
 }
 
-fn terms_are_the_separate_functions<const N: usize>(case: &Case<N>) -> Outcome {
+fn terms_are_the_results_of_the_separate_functions<const N: usize>(case: &Case<N>) -> Outcome {
     let (arm, q, qd) = (case.arm(), &case.q, &case.qd);
     let scale = torque_scale(case, &arm);
     let mut found = Terms::default();
@@ -190,7 +190,7 @@ fn terms_are_the_separate_functions<const N: usize>(case: &Case<N>) -> Outcome {
     Ok(())
 }
 
-fn terms_overwrite_what_was_there<const N: usize>(case: &Case<N>) -> Outcome {
+fn terms_do_not_depend_on_the_previous_content<const N: usize>(case: &Case<N>) -> Outcome {
     let (arm, q, qd) = (case.arm(), &case.q, &case.qd);
     let mut fresh = Terms::default();
     terms(&arm, q, qd, &mut fresh);

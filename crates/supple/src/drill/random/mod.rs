@@ -40,7 +40,7 @@ pub(super) fn run(args: &DrillArgs, description: &Description, count: u64) -> Re
             ),
         });
     }
-    let rows = with_dof!(description.dof(), N => search::<N>(args, description, count))??;
+    let rows = with_dof!(description.dof(), N => run_cases::<N>(args, description, count))??;
     match args.json {
         true => print_json(&rows)?,
         false => print_line(&page::terminal(&rows))?,
@@ -50,16 +50,19 @@ pub(super) fn run(args: &DrillArgs, description: &Description, count: u64) -> Re
         supple_files::write_atomic(file, text.as_bytes())
             .map_err(|error| Failure::file("write", file, error))?;
     }
-    let seeds: Vec<String> = rows
+    let violating_seeds: Vec<String> = rows
         .iter()
         .filter(|row| !row.excesses.is_empty())
         .map(|row| row.seed.to_string())
         .collect();
-    if seeds.is_empty() {
+    if violating_seeds.is_empty() {
         return Ok(());
     }
-    let more = seeds.len().saturating_sub(NAMED_SEEDS);
-    let mut named = seeds.into_iter().take(NAMED_SEEDS).collect::<Vec<_>>();
+    let more = violating_seeds.len().saturating_sub(NAMED_SEEDS);
+    let mut named = violating_seeds
+        .into_iter()
+        .take(NAMED_SEEDS)
+        .collect::<Vec<_>>();
     if more > 0 {
         named.push(format!("{more} more"));
     }
@@ -68,8 +71,8 @@ pub(super) fn run(args: &DrillArgs, description: &Description, count: u64) -> Re
     })
 }
 
-/// Runs the cases on all processors; returns the rows in the order of their seeds.
-fn search<const N: usize>(
+/// Runs the cases on all processors, until an interrupt; returns their rows in the order of the seeds.
+fn run_cases<const N: usize>(
     args: &DrillArgs,
     description: &Description,
     count: u64,
@@ -87,11 +90,12 @@ fn search<const N: usize>(
                 print_status(&format!("{index}/{count} cases"));
             }
             let seed = args.seed.wrapping_add(index);
+            // Without a case, the arm cannot perform the drawn task: no row.
             let Some(case) = draw::case(&arm, seed) else {
                 continue;
             };
-            let course = course::run(&arm, &case)?;
-            let row = Row::new(seed, &case, &course);
+            let outcome = course::run(&arm, &case)?;
+            let row = Row::new(seed, &case, &outcome);
             rows.lock()
                 .unwrap_or_else(|poisoned| poisoned.into_inner())
                 .push(row);
