@@ -43,13 +43,13 @@ impl fmt::Display for Address {
 }
 
 impl Address {
-    /// Returns the socket folder of the system with this prefix: `supple-bus/PREFIX` under `$XDG_RUNTIME_DIR`, or
+    /// Returns the socket folder of the system that `prefix` identifies: `supple-bus/PREFIX` under `$XDG_RUNTIME_DIR`, or
     /// `/tmp/supple-bus-UID/PREFIX` if the variable is not set.
     ///
     /// # Errors
-    /// If the parent folder is not accessible only to its owner.
+    /// If the parent folder cannot be created, belongs to another user, or is accessible to other users.
     pub fn of_system(prefix: &str) -> Result<Address, BusError> {
-        let above = OwnerFolder::open(runtime_folder("supple-bus"))?;
-        Ok(Address::Folder(above.path().join(prefix)))
+        let parent = OwnerFolder::open(runtime_folder("supple-bus"))?;
+        Ok(Address::Folder(parent.path().join(prefix)))
     }
 }

@@ -1,4 +1,5 @@
-//! How often the verdict's upper bound covers the measured tracking error, from the files of `verdict_runs`.
+//! How often the measured tracking error is at most the upper bound that the verdict on the identified model states
+//! (`docs/verdict.md`), from the files of `verdict_runs`.
 //!
 //! ```text
 //! cargo run --release -p supple-experiment --example verdict_coverage -- FOLDER
@@ -13,18 +14,19 @@ use supple_model::{Description, with_dof};
 
 /// Seeds from here on are those of ideal plants.
 const IDEAL: u64 = 10_000;
-/// Seeds on which the factor of the upper bound was chosen.
-const CHOSEN_ON: [Range<u64>; 2] = [0..55, 130..185];
-/// Stiffness of the tracking \[N/m\].
+/// Seeds of the runs from which the factor from the estimated error to its upper bound was chosen.
+const USED_FOR_FACTOR: [Range<u64>; 2] = [0..55, 130..185];
+/// Stiffness of the impedance law with which the runs tracked the sinusoid \[N/m\].
 const STIFFNESS_N_PER_M: f64 = 5.0;
 
-/// Returns the interval from the held-out motion in a file.
+/// Returns the interval from the held-out motion in a file. A row has the time, and angle, velocity and residual torque of each
+/// joint.
 fn interval<const N: usize>(
     description: &Description,
     text: &str,
 ) -> Result<ErrorInterval, Box<dyn std::error::Error>> {
-    let held = text.lines().filter_map(|line| line.strip_prefix("held,"));
-    let rows: Vec<Vec<f64>> = held
+    let held_out = text.lines().filter_map(|line| line.strip_prefix("held,"));
+    let rows: Vec<Vec<f64>> = held_out
         .map(|line| line.split(',').map(str::parse).collect())
         .collect::<Result<_, _>>()?;
     let matrix = |first: usize| DMatrix::from_fn(rows.len(), N, |i, j| rows[i][first + 3 * j]);
@@ -44,30 +46,31 @@ fn interval<const N: usize>(
         excluded_intervals: Vec::new(),
     };
     let region = SinusoidRegion::<N>::new(description)?.ok_or("the sinusoid is out of reach")?;
-    let moving: Vec<usize> = (0..N).collect();
+    let identified_joints: Vec<usize> = (0..N).collect();
     let residuals = matrix(3);
     let interval = error_interval(
         &region,
-        &moving,
+        &identified_joints,
         &[(&motion, &residuals)],
         STIFFNESS_N_PER_M,
     );
     Ok(interval.ok_or("no interval")?)
 }
 
-/// Measured error of a run, and the interval that was stated for it \[m\].
-struct Judged {
+/// Measured error of a run, and the interval that the verdict states \[m\].
+struct RunResult {
     error_m: f64,
     interval: ErrorInterval,
 }
 
-fn print_row(name: &str, runs: &[Judged]) {
+/// Prints the counts, then the median, the minimum and the 10 % quantile of the upper bound relative to the measured error.
+fn print_row(name: &str, runs: &[RunResult]) {
     let mut ratios: Vec<f64> = runs
         .iter()
         .map(|run| run.interval.upper_m / run.error_m)
         .collect();
     ratios.sort_by(f64::total_cmp);
-    let share = |of: &dyn Fn(&Judged) -> bool| {
+    let share = |of: &dyn Fn(&RunResult) -> bool| {
         let count = runs.iter().filter(|run| of(run)).count();
         format!(
             "{count} ({:.0} %)",
@@ -91,7 +94,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .nth(1)
         .ok_or("usage: verdict_coverage FOLDER")?;
     let mut failed = 0;
-    let mut judged = BTreeMap::<String, Vec<Judged>>::new();
+    let mut results = BTreeMap::<String, Vec<RunResult>>::new();
     for entry in std::fs::read_dir(folder)? {
         let path = entry?.path();
         let stem = path.file_stem().and_then(|stem| stem.to_str());
@@ -108,11 +111,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         }
         let description = Description::asset(arm)?;
         let interval = with_dof!(description.dof(), N => interval::<N>(&description, &text))?;
-        let interval = interval.map_err(|error| wrong(&path, &error))?;
+        let interval = interval.map_err(|error| with_path(&path, &error))?;
         let groups = match seed >= IDEAL {
             true => vec!["ideal".to_owned()],
             false => {
-                let chosen = CHOSEN_ON.iter().any(|seeds| seeds.contains(&seed));
+                let chosen = USED_FOR_FACTOR.iter().any(|seeds| seeds.contains(&seed));
                 let used = if chosen { "used" } else { "not used" };
                 let all = "with effects".to_owned();
                 vec![all, format!("{used} to choose the factor"), arm.to_owned()]
@@ -120,24 +123,25 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         };
         for group in groups {
             let interval = interval.clone();
+            // The second number is the error with the Stribeck effect in the feed-forward.
             let error_m = numbers[1];
-            judged
+            results
                 .entry(group)
                 .or_default()
-                .push(Judged { error_m, interval });
+                .push(RunResult { error_m, interval });
         }
     }
     println!(
         "| | runs | error at most the upper bound | error below the lower bound | upper bound over error, median | least | tenth |"
     );
     println!("|---|---|---|---|---|---|---|");
-    for (name, runs) in &judged {
+    for (name, runs) in &results {
         print_row(name, runs);
     }
     println!("{failed} runs gave no model or no tracking, most by a fault during the excitation");
     Ok(())
 }
 
-fn wrong(path: &Path, error: &dyn std::fmt::Display) -> String {
+fn with_path(path: &Path, error: &dyn std::fmt::Display) -> String {
     format!("{}: {error}", path.display())
 }

@@ -26,12 +26,12 @@ pub struct Log {
     pub q_rad: DMatrix<f64>,
     /// Measured joint velocities \[rad/s\]; `None`: the angles are differentiated.
     pub qd_rad_per_s: Option<DMatrix<f64>>,
-    /// Motor torques at the joints \[N m\].
+    /// Motor torques, commanded or measured, as joint torques \[N m\].
     pub tau_nm: DMatrix<f64>,
 }
 
 impl Log {
-    /// Checks shapes, values, clock, units and motion. `identified_joints` must move; the other joints
+    /// Checks shapes, values, sample times, units and motion. `identified_joints` must move; the other joints
     /// may be at rest.
     ///
     /// # Errors
@@ -60,7 +60,7 @@ impl Log {
         Ok(warnings)
     }
 
-    /// Does the same as [`Log::check_with_cutoff`], without the units of angles and velocities.
+    /// Does the same as [`Log::check_with_cutoff`], but does not check the units of angles and velocities.
     pub(crate) fn check_without_units(
         &self,
         dof: usize,
@@ -154,8 +154,8 @@ impl Log {
         let at = steps.iter().position(|dt| *dt == largest).unwrap_or(0);
         steps.sort_by(f64::total_cmp);
         let median = steps[steps.len() / 2];
-        let harmless_s = cutoff_hz.map_or(0.0, |hz| GAP_PERIODS / hz);
-        if largest > (GAP_MEDIANS * median).max(harmless_s) {
+        let max_bridged_s = cutoff_hz.map_or(0.0, |hz| GAP_PERIODS / hz);
+        if largest > (GAP_MEDIANS * median).max(max_bridged_s) {
             let problem = format!(
                 "a gap of {largest:.4} s after sample {at}, steps are {median:.4} s otherwise"
             );
@@ -218,7 +218,7 @@ impl Log {
             .try_for_each(|j| self.check_velocity_unit(*j))
     }
 
-    /// Compares the velocity with the slope of the angle; a ratio of 57 indicates degrees.
+    /// Compares the velocity with the slope of the angle; a velocity of 57 times the slope is in degrees per second.
     fn check_velocity_unit(&self, joint: usize) -> Result<(), IdentError> {
         let Some(qd) = &self.qd_rad_per_s else {
             return Ok(());

@@ -50,9 +50,11 @@ pub(crate) struct LogScanner {
     reader: LinearReader,
     /// Length of the intact beginning of the file: magic and complete MCAP records \[bytes\].
     complete_bytes: u64,
+    /// Records of the current chunk that are still to be returned.
     chunk: VecDeque<Record<'static>>,
     schemas: BTreeMap<u16, Arc<Schema>>,
     channels: BTreeMap<u16, Arc<Channel>>,
+    /// Whether the record `DataEnd` has been read; the summary after it is checked, but not returned.
     past_data: bool,
     ended: bool,
 }
@@ -96,8 +98,8 @@ impl LogScanner {
     /// Returns the next item; `None` at the end of a complete file.
     ///
     /// # Errors
-    /// [`LogError::Incomplete`] if the file is truncated or damaged, then `None`; [`LogError::Format`] if it is not an
-    /// MCAP file; [`LogError::Read`].
+    /// [`LogError::Incomplete`] if the file is truncated or damaged (later calls return `None`); [`LogError::Format`] if it is
+    /// not an MCAP file; [`LogError::Read`].
     pub fn next(&mut self) -> Result<Option<LogItem>, LogError> {
         loop {
             while let Some(record) = self.chunk.pop_front() {
@@ -129,7 +131,7 @@ impl LogScanner {
         }
     }
 
-    /// Returns the next record at the top level of the file; decodes the records of a chunk.
+    /// Returns the next record at the top level of the file; if it is a chunk, `self.chunk` receives its records.
     fn record(&mut self) -> Result<Option<Record<'static>>, LogError> {
         loop {
             match self.reader.next_event() {
@@ -167,6 +169,7 @@ impl LogScanner {
         }
     }
 
+    /// Stores a schema or a channel; returns a message as an item; ignores other records.
     fn data_item(&mut self, record: Record<'static>) -> Result<Option<LogItem>, LogError> {
         match record {
             Record::Schema { header, data } => {

@@ -1,7 +1,7 @@
 //! Queues between the control loop and the non-realtime threads: ring buffers of fixed size with one producer and one
 //! consumer each.
 //!
-//! Idle requests have reserved entries in the request queue, and a separate channel: an atomic counter that the loop
+//! Idle requests have reserved entries in the request queue, and a separate channel: an atomic number that the loop
 //! reads first in each cycle ([`idle_channel`]).
 
 use rtrb::{Consumer, Producer, RingBuffer};
@@ -12,11 +12,12 @@ use supple_realtime::LivenessCounter;
 
 /// Telemetry queue length, in cycles.
 const TELEMETRY: usize = 1024;
-/// Capacity for requests between two cycles, and additional entries reserved for idle requests.
+/// Capacity for all requests between two cycles.
 const REQUESTS: usize = 16;
+/// Additional capacity that only idle requests may use.
 const IDLE_REQUESTS: usize = 8;
 const REPLIES: usize = 64;
-/// Capacity for learned terms: the requests of two estimates of the largest arm.
+/// Capacity for the learner's requests: at most one per joint and one more for each estimate.
 const LEARNED: usize = 32;
 /// Capacity for replies to idle requests; the loop sends at most one per cycle.
 const IDLE_REPLIES: usize = 64;
@@ -111,7 +112,7 @@ impl HelperQueues {
         self.learned.push(request).is_ok()
     }
 
-    /// Number of arm states that the loop has discarded.
+    /// Number of arm states that the loop has discarded because they are not from this system's plant or not of this arm.
     pub fn states_dropped(&self) -> u64 {
         self.states_dropped.load(Ordering::Relaxed)
     }
@@ -125,7 +126,7 @@ impl HelperQueues {
 /// The loop's side of the channel for idle requests.
 #[derive(Debug)]
 pub struct LoopIdleChannel {
-    last_request: Arc<AtomicU64>,
+    last_batch: Arc<AtomicU64>,
     answered: u64,
     replies: Producer<OperatorReply>,
 }
@@ -133,34 +134,34 @@ pub struct LoopIdleChannel {
 /// The side of the channel in the thread for idle requests.
 #[derive(Debug)]
 pub struct IdleThreadChannel {
-    last_request: Arc<AtomicU64>,
+    last_batch: Arc<AtomicU64>,
     replies: Consumer<OperatorReply>,
 }
 
-/// Creates the channel for idle requests: a counter that each request increments, so it can never be full.
+/// Creates the channel for idle requests: the number of the last batch of requests, so it can never be full.
 pub fn idle_channel() -> (LoopIdleChannel, IdleThreadChannel) {
-    let last_request = Arc::new(AtomicU64::new(0));
+    let last_batch = Arc::new(AtomicU64::new(0));
     let (replies_in, replies_out) = RingBuffer::new(IDLE_REPLIES);
     let loop_end = LoopIdleChannel {
-        last_request: last_request.clone(),
+        last_batch: last_batch.clone(),
         answered: 0,
         replies: replies_in,
     };
     let thread_end = IdleThreadChannel {
-        last_request,
+        last_batch,
         replies: replies_out,
     };
     (loop_end, thread_end)
 }
 
 impl LoopIdleChannel {
-    /// Returns the number of the last request, if it has not been answered.
+    /// Returns the number of the last batch of requests, if it has not been answered.
     pub(crate) fn pending_request(&self) -> Option<u64> {
-        let last_request = self.last_request.load(Ordering::Acquire);
-        (last_request != self.answered).then_some(last_request)
+        let last_batch = self.last_batch.load(Ordering::Acquire);
+        (last_batch != self.answered).then_some(last_batch)
     }
 
-    /// Replies to all requests up to the reply's number. If the reply queue is full, the requests stay pending until
+    /// Replies to all batches up to the reply's number. If the reply queue is full, the requests stay pending until
     /// the next cycle.
     pub(crate) fn answer(&mut self, reply: OperatorReply) {
         if self.replies.push(reply).is_ok() {
@@ -175,9 +176,9 @@ impl LoopIdleChannel {
 }
 
 impl IdleThreadChannel {
-    /// Requests idle; `number` is one above the number of the last request.
-    pub fn set_requested(&self, number: u64) {
-        self.last_request.store(number, Ordering::Release);
+    /// Requests idle for the batch of this number, which must be above that of the last batch.
+    pub fn set_requested(&self, batch: u64) {
+        self.last_batch.store(batch, Ordering::Release);
     }
 
     /// Removes and returns the oldest reply in the queue.

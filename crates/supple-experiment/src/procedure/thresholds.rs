@@ -9,9 +9,9 @@ use supple_core::dynamics::gravity;
 use supple_core::{Config, Vector};
 use supple_model::{Description, MinimumThresholds};
 
-/// Load at the tip at rest \[N\].
+/// Minimum of `plausible.load_n`, the unmodelled load at the tip at rest that causes no fault \[N\].
 const LOAD_N: f64 = 40.0;
-/// Load and force at the tip that no arm reaches \[N\]: it disables both checks.
+/// Value of `plausible.load_n` and `collision.tip_force_n` that no arm reaches \[N\]: it disables both checks.
 const UNCHECKED_N: f64 = 1e4;
 /// Error of the model, as a fraction of its gravity: with an error of 30 % in a joint's gravity, and motors that give 1/1.5 of
 /// the commanded torque, the true gravity takes 2.0 to 2.1 times the model's torque.
@@ -22,8 +22,8 @@ const FRICTION_ERROR_RATIO: f64 = 2.0;
 const MARGIN_NM: f64 = 1.0;
 /// Maximum threshold as a fraction of the joint's torque limit.
 const MAX_LIMIT_FRACTION: f64 = 0.9;
-/// With the model of the first fit, in which the torque scales of the motors may still differ: `collision.move_share` and
-/// `plausible.against_share`.
+/// `collision.move_share` and `plausible.against_share` with the model of the first fit, in which the torque scale may still
+/// differ from motor to motor.
 const FIRST_FIT_MOVE_SHARE: f64 = 2.0;
 const FIRST_FIT_AGAINST_SHARE: f64 = 0.35;
 /// Number of angles per joint of the grid of poses at which gravity is evaluated.
@@ -44,7 +44,7 @@ pub fn minimum_thresholds<const N: usize>(
         tip_force_n: 0.0,
         hold_pose: has_no_brakes,
         load_n: LOAD_N,
-        // This threshold is not raised, because motion against the torque reveals a motor of the wrong sign.
+        // Not raised for an arm with brakes: motion against the torque reveals a motor of the wrong sign.
         against_share: 0.0,
     };
     match (has_no_brakes, before_first_fit) {
@@ -64,6 +64,7 @@ pub fn minimum_thresholds<const N: usize>(
     let threshold_nm = Vector::<N>::from_fn(|joint, _| {
         let error_nm = GRAVITY_ERROR_SHARE * max_nm[joint]
             + FRICTION_ERROR_RATIO * config.friction[joint].breakaway_nm
+            // A torque ramp on a joint adds this torque at most.
             + RAMP_LIMIT_NM.min(limits_nm[joint])
             + MARGIN_NM;
         error_nm.min(MAX_LIMIT_FRACTION * limits_nm[joint])

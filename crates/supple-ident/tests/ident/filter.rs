@@ -1,4 +1,4 @@
-//! Filter, derivative and grid compared with SciPy's numbers and with analytic results.
+//! Filter, derivative and resampling compared with SciPy's numbers and with analytic results.
 
 use std::f64::consts::TAU;
 use supple_ident::filter::{LowPass, differentiate};
@@ -88,6 +88,7 @@ fn rejects_signals_that_it_cannot_filter() {
     assert!(LowPass::butterworth4(50.0, 100.0).is_err());
     assert!(LowPass::butterworth4(-1.0, 100.0).is_err());
     let filter = LowPass::butterworth4(8.0, 100.0).unwrap();
+    // The filter extends the signal by 15 samples at each end, and needs more than that.
     assert!(filter.zero_phase(&[0.0; 15]).is_err());
 }
 
@@ -196,12 +197,13 @@ fn invalid_logs_are_rejected_with_column_and_remedy() {
     assert!(log(600).check(2, &[2]).is_err());
     assert!(log(600).check(2, &[1, 0]).is_err());
     assert!(log(600).check(2, &[0, 1]).unwrap().is_empty());
+    // A log of 2 s causes a warning.
     assert_eq!(log(200).check(2, &[0, 1]).unwrap().len(), 1);
 }
 
 #[test]
-fn a_resting_joint_is_accepted_if_it_is_held() {
-    let mut held = log(600);
-    held.q_rad.column_mut(1).fill(0.3);
-    assert!(held.check(2, &[0]).unwrap().is_empty());
+fn a_joint_at_rest_is_accepted_if_it_is_not_identified() {
+    let mut one_at_rest = log(600);
+    one_at_rest.q_rad.column_mut(1).fill(0.3);
+    assert!(one_at_rest.check(2, &[0]).unwrap().is_empty());
 }

@@ -3,13 +3,13 @@
 /// Maximum number of joints of an arm.
 pub const MAX_DOF: usize = 7;
 
-/// Drive state, as the safety module defines it.
+/// State of the drives: the safety module's states off, idle and active, or held by the plant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Drives {
-    /// The motors have no power: emergency stop.
+    /// The motors have no power (emergency stop), or none of them replies.
     Off = 0,
-    /// The motors brake and ignore torques.
+    /// The motors ignore torques, and brake if they can.
     Idle = 1,
     /// The motors produce the commanded torques.
     Active = 2,

@@ -1,5 +1,5 @@
-//! The arm and the objects of its scene, which the rapier engine simulates; the interface has only types of this crate and of
-//! nalgebra.
+//! The arm, which `chain.rs` simulates, and the objects of its scene, which the rapier engine simulates; the interface has only
+//! types of this crate and of nalgebra.
 
 mod chain;
 mod convert;
@@ -106,12 +106,12 @@ impl<const N: usize> World<N> {
 
     /// Returns the object with the deepest penetration of the tip, and the depth \[m\].
     pub fn deepest(&self, tip: &TipMotion) -> Option<(String, f64)> {
-        let met = self.surfaces.iter().filter_map(|surface| {
+        let contacts = self.surfaces.iter().filter_map(|surface| {
             let body = &self.physics.bodies[surface.body];
             let contact = surface.contact(body, &self.tip, tip)?;
             Some((surface.object(body).name, contact.depth_m))
         });
-        met.max_by(|a, b| a.1.total_cmp(&b.1))
+        contacts.max_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     /// Advances everything by `dt_s`.
@@ -123,7 +123,7 @@ impl<const N: usize> World<N> {
         self.physics.integration_parameters.dt = dt_s;
         self.physics.step();
         for surface in &self.surfaces {
-            // Mutable access to a body makes the engine re-check it.
+            // Mutable access to a body makes the engine re-check it: fixed bodies are only read.
             if self.physics.bodies[surface.body].is_dynamic() {
                 let body = &mut self.physics.bodies[surface.body];
                 body.reset_forces(false);

@@ -34,7 +34,7 @@ fn demo_of(arm: &Path, out: &Path) -> Answer {
 
 /// Replaces the first occurrence; panics if there is none.
 fn replaced(text: String, from: &str, to: &str) -> String {
-    assert!(text.contains(from), "{from} is in the file");
+    assert!(text.contains(from), "{from} is not in the file");
     text.replacen(from, to, 1)
 }
 
@@ -106,7 +106,7 @@ fn an_unwritable_folder_is_code_6_before_the_run() {
         assert_one_clear_line(&answer, &[arg(out), "--out"]);
         assert!(
             !answer.stderr.contains('%'),
-            "no progress: {}",
+            "progress was printed: {}",
             answer.stderr
         );
     }
@@ -146,6 +146,7 @@ fn an_interrupt_is_code_130_and_leaves_no_files() {
         .spawn()
         .expect("it starts");
     let pid = child.id().to_string();
+    // The program creates the folder of the logs just before the experiments.
     while tree(folder.path())
         .iter()
         .all(|path| !path.ends_with("logs"))
@@ -198,7 +199,7 @@ fn outputs_that_are_not_regular_files_are_code_6_before_anything_is_written() {
     let answer = run_in(folder.path(), &["demo", "--quiet", "--out", "/dev/null"]);
     assert_eq!(answer.code, Some(6), "{}", answer.stderr);
     assert_one_clear_line(&answer, &["/dev/null: not a directory", "--out"]);
-    assert_eq!(tree(folder.path()), before, "no additional files");
+    assert_eq!(tree(folder.path()), before, "a file was added or removed");
     for device in ["/dev/null", "/dev/full"] {
         let kind = fs::metadata(device).expect("still there").file_type();
         assert!(kind.is_char_device(), "{device}");
@@ -260,10 +261,10 @@ fn numbers_out_of_range_are_code_2_with_their_range() {
             answer.stderr
         );
         let line = answer.stderr.lines().next().unwrap_or_default();
-        assert!(line.contains(option), "{option} in {line}");
+        assert!(line.contains(option), "{option} is not in {line}");
         assert!(
             line.contains(" to ") || line.contains("..="),
-            "a range in {line}"
+            "no range in {line}"
         );
     }
     assert!(tree(folder.path()).is_empty());
