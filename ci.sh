@@ -6,7 +6,7 @@ cd "$(dirname "$0")"
 PLAIN=(fmt clippy test doctest doc)
 FULL=(deny advisories page package urdfs instructions fused edits cycles fuzz cortex-m)
 # Also of the full run: each computes on one processor or waits, so they run one after the other beside those above.
-BESIDE=(ur10e python impact services socketcan)
+BESIDE=(ur10e python impact services ros socketcan)
 CARGO_DENY_VERSION=0.20.2
 CARGO_FUZZ_VERSION=0.13.2
 GUNGRAUN_VERSION=0.20.0
@@ -295,6 +295,13 @@ step_services() {
         systemd-analyze verify --man=no "$copy"
         systemd-analyze security --offline=true --no-pager --threshold=20 "$unit" | tail -n 1
     done
+}
+
+# ros: the bridge to ROS 2 with a client of other makers, on a simulated arm; installs that
+step_ros() {
+    virtual_environment ros tests/ros/requirements.txt
+    build_programs
+    "$WORK/ros/bin/python" tests/ros/run.py --programs target/debug
 }
 
 thumb_core() {

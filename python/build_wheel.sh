@@ -16,7 +16,10 @@ GLIBC=${SUPPLE_GLIBC:-2.28}
 ARCH=$(uname -m)
 HOST=$(rustc -vV | sed -n 's/^host: //p')
 TOOLS=target/ci/wheel
-PROGRAMS=(supple supple-report supple-rt supple-sim supple-can supple-emu)
+# One folder for each part: their flags differ, and in a common one each part would compile the other's dependencies again.
+PROGRAMS_TARGET=target/wheel-programs
+PACKAGE_TARGET=target/wheel-package
+PROGRAMS=(supple supple-report supple-ros supple-rt supple-sim supple-can supple-emu)
 [[ $HOST == *-linux-gnu ]] || {
     echo "written for Linux with glibc, this is $HOST" >&2
     exit 1
@@ -29,8 +32,9 @@ export CARGO_PROFILE_RELEASE_DEBUG=false CARGO_PROFILE_RELEASE_STRIP=symbols
 
 packages=()
 for program in "${PROGRAMS[@]}"; do packages+=(--bin "$program"); done
-cargo zigbuild --release --locked --workspace --exclude supple-python "${packages[@]}" --target "$HOST.$GLIBC"
-built=target/$HOST/release
+cargo zigbuild --release --locked --workspace --exclude supple-python "${packages[@]}" --target "$HOST.$GLIBC" \
+    --target-dir "$PROGRAMS_TARGET"
+built=$PROGRAMS_TARGET/$HOST/release
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -46,7 +50,7 @@ completions zsh zsh/site-functions _supple
 completions fish fish/vendor_completions.d supple.fish
 
 maturin build --release --locked --zig --compatibility "manylinux_${GLIBC/./_}" --target "$HOST" \
-    --manifest-path python/Cargo.toml --out "$work/wheel"
+    --manifest-path python/Cargo.toml --target-dir "$PACKAGE_TARGET" --out "$work/wheel"
 python3 python/add_programs.py "$work"/wheel/*.whl "$work" --out "$OUT"
 
 version=$("$built/supple" --version | cut -d ' ' -f 2)

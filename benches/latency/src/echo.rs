@@ -13,7 +13,7 @@ const REPLY_BYTES: usize = size_of::<TorqueCommand>();
 
 pub fn measure(common: &Common) -> Result<Measured, Failure> {
     let (socket, other) = UnixDatagram::pair()?;
-    let _reflector = PeerProcess::start("answer_echo", common, |command| {
+    let _reflector = PeerProcess::start("reflect", common, |command| {
         command.stdin(OwnedFd::from(other));
     })?;
     let (there, mut back) = ([1; REQUEST_BYTES], [0; REPLY_BYTES]);

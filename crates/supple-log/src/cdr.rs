@@ -7,14 +7,20 @@ use serde::{Deserialize, Serialize};
 const ENCAPSULATION: [u8; 4] = [0, 1, 0, 0];
 
 /// Encodes `value`, replacing the content of `into`.
-pub(crate) fn encode<T: Serialize>(value: &T, into: &mut Vec<u8>) -> cdr_encoding::Result<()> {
+///
+/// # Errors
+/// `cdr_encoding::Error` for a value that CDR does not have, such as a map.
+pub fn encode<T: Serialize>(value: &T, into: &mut Vec<u8>) -> cdr_encoding::Result<()> {
     into.clear();
     into.extend_from_slice(&ENCAPSULATION);
     cdr_encoding::to_writer::<T, LittleEndian, _>(into, value)
 }
 
-/// Rejects another byte order, missing bytes and excess bytes.
-pub(crate) fn decode<'a, T: Deserialize<'a>>(data: &'a [u8]) -> Result<T, String> {
+/// Decodes a message.
+///
+/// # Errors
+/// What is wrong: another byte order, missing bytes, excess bytes.
+pub fn decode<'a, T: Deserialize<'a>>(data: &'a [u8]) -> Result<T, String> {
     let values = values(data)?;
     let (value, read) =
         cdr_encoding::from_bytes::<T, LittleEndian>(values).map_err(|error| error.to_string())?;

@@ -25,7 +25,7 @@
 
 #![forbid(unsafe_code)]
 
-mod cdr;
+pub mod cdr;
 mod config;
 mod definition;
 mod emit;

@@ -6,7 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use std::path::PathBuf;
 use supple_bus::Address;
-use supple_cli::arguments::{OfflineCommand, PlantArgs, UrdfArgs};
+use supple_cli::arguments::{OfflineCommand, PlantArgs, RosArgs, UrdfArgs};
 use supple_cli::exit::CODES;
 use supple_cli::range::between;
 use supple_plant::Injection;
@@ -34,6 +34,9 @@ pub enum Command {
     /// Show a running system, or a log, on a page in the browser; viewers of the Foxglove protocol can also connect.
     #[command(after_help = CODES)]
     View(ViewArgs),
+    /// Make a running system a node of ROS 2, over Zenoh: joint states, transforms, wrenches and the controller's state.
+    #[command(after_help = CODES)]
+    Ros(RosArgs),
     /// Put a running system into a mode.
     Mode(ModeArgs),
     /// Change stiffness and damping of a running system, along a ramp.
@@ -575,6 +578,7 @@ impl Command {
             Command::Up(args) => args.json,
             Command::Drill(args) => args.json,
             Command::View(args) => args.json,
+            Command::Ros(args) => args.json,
             Command::Mode(ModeArgs { system, .. })
             | Command::Gains(GainsArgs { system, .. })
             | Command::Learning(LearningArgs {

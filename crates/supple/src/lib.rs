@@ -12,6 +12,7 @@ mod drill;
 mod man;
 mod motors;
 mod operate;
+mod ros;
 mod sweep;
 mod up;
 mod view;
@@ -52,6 +53,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
             | OfflineCommand::Identification(_),
         ) => Err(exec_report()),
         Command::View(args) => view::run(args),
+        Command::Ros(args) => Err(ros::exec(args)),
         Command::Up(args) => up::run(args),
         Command::Drill(args) => drill::run(args),
         Command::Motors(args) => motors::run(args),

@@ -6,6 +6,7 @@ mod identification;
 mod log;
 mod new;
 mod plant;
+mod ros;
 
 pub use demo::DemoArgs;
 pub use effects::EffectsArgs;
@@ -17,6 +18,7 @@ pub use identification::{
 pub use log::{LogCommand, LogDataCommand, PlotArgs};
 pub use new::NewArgs;
 pub use plant::PlantCommand;
+pub use ros::RosArgs;
 pub use supple_model::UrdfArgs;
 pub use supple_plant::PlantArgs;
 

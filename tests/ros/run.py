@@ -1,0 +1,252 @@
+"""Checks `supple ros` with a ROS 2 client that is not ours: zenoh-ros2-sdk, which speaks as rmw_zenoh does.
+
+    python tests/ros/run.py --programs target/debug
+
+Starts a Zenoh router on 127.0.0.1, a simulated WAM and the bridge, each with names of its own.
+"""
+
+import argparse
+import contextlib
+import json
+import os
+import pathlib
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import traceback
+
+import zenoh
+from rosbags.typesys import Stores, get_typestore
+from zenoh_ros2_sdk import ROS2Publisher, ROS2Subscriber
+from zenoh_ros2_sdk.discovery import get_topic_names_and_types
+from zenoh_ros2_sdk.qos import QosDurability, QosProfile
+from zenoh_ros2_sdk.session import ZenohSession
+
+PREFIX = f"ros_{os.getpid()}"
+DOMAIN = 42
+TYPES = get_typestore(Stores.ROS2_JAZZY)
+TOPICS = {
+    "/joint_states": "sensor_msgs/msg/JointState",
+    "/tf": "tf2_msgs/msg/TFMessage",
+    "/robot_description": "std_msgs/msg/String",
+    "/wrench_observed": "geometry_msgs/msg/WrenchStamped",
+    "/wrench_ext": "geometry_msgs/msg/WrenchStamped",
+}
+
+KEPT = []
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def router(port):
+    config = zenoh.Config()
+    for key, value in {
+        "mode": '"router"',
+        "listen/endpoints": f'["tcp/127.0.0.1:{port}"]',
+        "connect/endpoints": "[]",
+        "scouting/multicast/enabled": "false",
+    }.items():
+        config.insert_json5(key, value)
+    return zenoh.open(config)
+
+
+class Program:
+    """A program with its output, which is interrupted at the end."""
+
+    def __init__(self, *command, ready=None):
+        self.lines = []
+        self.process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True
+        )
+        threading.Thread(target=self.read, daemon=True).start()
+        if ready:
+            wait(lambda: self.said(ready), f"{command[0]} says `{ready}`", self)
+
+    def read(self):
+        self.lines.extend(self.process.stdout)
+
+    def said(self, text):
+        return any(text in line for line in self.lines)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.send_signal(signal.SIGINT)
+        try:
+            self.process.wait(20)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+
+
+def wait(holds, what, program=None, within_s=20):
+    end = time.monotonic() + within_s
+    while not holds():
+        if time.monotonic() > end:
+            raise SystemExit(f"not within {within_s} s: {what}\n{''.join(program.lines) if program else ''}")
+        time.sleep(0.02)
+    print(f"ok: {what}")
+
+
+def subscribe(topic, store, **options):
+    """Subscribes; returns the list into which messages come."""
+    received = []
+    name = TOPICS[topic]
+    # Ends when it is collected.
+    KEPT.append(ROS2Subscriber(
+        topic,
+        name,
+        received.append,
+        msg_definition="",
+        domain_id=DOMAIN,
+        type_hash=store.hash_rihs01(name),
+        **options,
+    ))
+    return received
+
+
+def trajectory(names, points):
+    """Points are pairs of positions and seconds."""
+    kind = TYPES.types
+    time_of = kind["builtin_interfaces/msg/Time"]
+    duration = kind["builtin_interfaces/msg/Duration"]
+    point = kind["trajectory_msgs/msg/JointTrajectoryPoint"]
+    import numpy as np
+
+    def at(positions, seconds):
+        none = np.zeros(0)
+        whole = int(seconds)
+        after = duration(whole, int((seconds - whole) * 1e9))
+        return point(np.array(positions), none, none, none, after)
+
+    return {
+        "header": kind["std_msgs/msg/Header"](time_of(0, 0), ""),
+        "joint_names": list(names),
+        "points": [at(*each) for each in points],
+    }
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--programs", type=pathlib.Path, default=pathlib.Path("target/debug"))
+    supple = (parser.parse_args().programs / "supple").resolve()
+    port = free_port()
+    with contextlib.ExitStack() as stack:
+        stack.callback(router(port).close)
+        up = Program(supple, "up", "--plant", "sim", "--prefix", PREFIX, "--no-log")
+        stack.enter_context(up)
+
+        def status():
+            found = subprocess.run([supple, "status", "--prefix", PREFIX, "--json"], capture_output=True, text=True)
+            return json.loads(found.stdout) if found.returncode == 0 else {}
+
+        wait(lambda: status().get("mode") == "track", "the simulated arm tracks", up)
+        subprocess.run([supple, "mode", "gravity-hold", "--prefix", PREFIX], check=True, capture_output=True)
+
+        bridge = Program(
+            supple, "ros", "--prefix", PREFIX, "--connect", f"tcp/127.0.0.1:{port}",
+            "--domain-id", str(DOMAIN), "--accept-trajectories", ready="ROS 2 node",
+        )
+        stack.enter_context(bridge)
+
+        client = ZenohSession.get_instance("127.0.0.1", port)
+        client.store = TYPES
+        client._registered_types = {name: name for name in [*TOPICS.values(), "trajectory_msgs/msg/JointTrajectory"]}
+
+        def listed():
+            return dict(get_topic_names_and_types(domain_id=DOMAIN))
+
+        wait(lambda: TOPICS.keys() <= listed().keys(), "the topics are in the graph", bridge)
+        wait(lambda: "/joint_trajectory" in listed(), "and the subscription", bridge)
+
+        latched = QosProfile(durability=QosDurability.TRANSIENT_LOCAL, history_depth=1)
+        described = subscribe("/robot_description", TYPES, qos=latched)
+        wait(lambda: described, "a later subscription receives the description", bridge)
+        assert "<robot" in described[0].data
+        joints = subscribe("/joint_states", TYPES)
+        frames = subscribe("/tf", TYPES)
+        forces = subscribe("/wrench_ext", TYPES)
+        wait(lambda: len(joints) > 50 and frames and forces, "joint states, transforms and wrenches arrive", bridge)
+        begin, first = time.monotonic(), len(joints)
+        time.sleep(2.0)
+        rate = (len(joints) - first) / (time.monotonic() - begin)
+        assert 80 < rate < 120, f"{rate} messages per second, 100 were asked for"
+        stamps = [message.header.stamp.sec + message.header.stamp.nanosec * 1e-9 for message in joints]
+        assert all(b > a for a, b in zip(stamps, stamps[1:])), "stamps grow"
+        assert abs(stamps[-1] - time.time()) < 5, "stamps are times of day"
+        names, start = joints[-1].name, list(joints[-1].position)
+        assert len(names) == 4 and len(frames[-1].transforms) >= 4
+
+        publisher = ROS2Publisher(
+            "/joint_trajectory",
+            "trajectory_msgs/msg/JointTrajectory",
+            msg_definition="",
+            domain_id=DOMAIN,
+            type_hash=TYPES.hash_rihs01("trajectory_msgs/msg/JointTrajectory"),
+        )
+
+        def moved(joint, by):
+            target = list(start)
+            target[joint] += by
+            return target
+
+        def send(*points, order=names):
+            publisher.publish(**trajectory(order, points))
+
+        time.sleep(0.5)
+        one, two = moved(0, 0.2), moved(3, -0.15)
+        send((one, 2.0), (two, 4.0))
+        arrives = {}
+
+        def passed(target):
+            return max(abs(a - b) for a, b in zip(joints[-1].position, target)) < 0.03
+
+        for name, target in {"first": one, "second": two}.items():
+            wait(lambda target=target: passed(target), f"the arm is in the {name} point", bridge)
+            arrives[name] = time.monotonic()
+        took = arrives["second"] - arrives["first"]
+        assert took > 1.0, f"the second move took {took} s"
+        # The end of the second move.
+        time.sleep(1.0)
+
+        for expected, points, order in (
+            ("joint_names are", [(one, 2.0)], ["a", "b", "c", "d"]),
+            ("positions, expected 4", [(one[:3], 2.0)], names),
+            ("expected more than", [(one, 2.0), (two, 2.0)], names),
+            ("refused by the controller", [(moved(0, 10.0), 2.0)], names),
+            ("refused by the controller", [(moved(0, 1.5), 0.05)], names),
+        ):
+            bridge.lines.clear()
+            before = list(joints[-1].position)
+            send(*points, order=order)
+            wait(lambda expected=expected: bridge.said(expected), f"rejected: {expected}", bridge)
+            time.sleep(0.3)
+            assert max(abs(a - b) for a, b in zip(joints[-1].position, before)) < 0.02, "the arm moved"
+
+        send((moved(0, 0.3), 8.0))
+        wait(lambda: status().get("mode") == "move", "a long move is on its way", bridge)
+        send()
+        wait(lambda: status().get("mode") == "gravity_hold", "a trajectory without points ends it", bridge)
+        assert status().get("fault") in (None, "none"), status()
+    print("all passed")
+
+
+if __name__ == "__main__":
+    # The client's threads do not end by themselves.
+    code = 1
+    try:
+        main()
+        code = 0
+    except SystemExit as end:
+        print(end, file=sys.stderr)
+    except Exception:
+        traceback.print_exc()
+    sys.stdout.flush()
+    os._exit(code)
