@@ -172,7 +172,7 @@ step_urdfs() {
 # urdfs_full: these and six more, identified too, with optimised programs; in no list
 step_urdfs_full() {
     virtual_environment urdfs tests/any_arm/requirements-held-back.txt
-    cargo build --release --locked --workspace --exclude supple-python --bins
+    cargo build --release --locked --workspace --exclude supple-python --exclude supple-ros --bins
     "$WORK/urdfs/bin/python" tests/any_arm/run.py --programs target/release --all
 }
 
