@@ -9,9 +9,9 @@ use supple_core::nalgebra::Vector3;
 /// State of the drives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Drives {
-    /// The motors have no power: emergency stop.
+    /// The motors have no power (emergency stop), or none of them replies.
     Off,
-    /// The motors brake and ignore torques.
+    /// The motors ignore torques, and brake if they can.
     Idle,
     /// The motors apply torques.
     Active,
