@@ -12,6 +12,7 @@ import base64
 import csv
 import hashlib
 import io
+import stat
 import zipfile
 from pathlib import Path
 
@@ -47,8 +48,8 @@ def main() -> None:
         rows = [row for row in csv.reader(io.StringIO(given.read(record).decode())) if row and row[0] != record]
         for name, data in files.items():
             entry = zipfile.ZipInfo(name)
-            # pip keeps the permission to execute.
-            entry.external_attr = (0o755 if "/scripts/" in name else 0o644) << 16
+            # A regular file: pip keeps the permission to execute of these alone.
+            entry.external_attr = (stat.S_IFREG | (0o755 if "/scripts/" in name else 0o644)) << 16
             made.writestr(entry, data, zipfile.ZIP_DEFLATED)
             rows.append([name, digest(data), str(len(data))])
         text = io.StringIO()
