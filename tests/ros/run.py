@@ -230,6 +230,14 @@ def main():
             time.sleep(0.3)
             assert max(abs(a - b) for a, b in zip(joints[-1].position, before)) < 0.02, "the arm moved"
 
+        bridge.lines.clear()
+        send((moved(0, -0.2), 3.0), (moved(0, 0.3), 6.0))
+        wait(lambda: status().get("mode") == "move", "a trajectory of two points is on its way", bridge)
+        subprocess.run([supple, "mode", "gravity-hold", "--prefix", PREFIX], check=True, capture_output=True)
+        wait(lambda: bridge.said("has left the move mode"), "the operator's request ends it", bridge)
+        time.sleep(4.0)
+        assert status().get("mode") == "gravity_hold", "the second point was not sent"
+
         send((moved(0, 0.3), 8.0))
         wait(lambda: status().get("mode") == "move", "a long move is on its way", bridge)
         send()

@@ -10,7 +10,7 @@ use std::sync::mpsc::Receiver;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 use supple_cli::arguments::RosArgs;
 use supple_core::Config;
-use supple_core::controller::Request;
+use supple_core::controller::{Mode, Request};
 use supple_ipc::message::{Outcome, Telemetry};
 use supple_ipc::{Domain, OperatorClient, TelemetryReader};
 use supple_log::{CycleTiming, Extras, LiveEncoder};
@@ -50,19 +50,39 @@ struct Moves<const N: usize> {
     sent: Option<(u64, Instant, Duration)>,
     /// End of the move that the arm makes.
     ends: Option<Instant>,
+    /// Whether the telemetry since the first accepted move has shown the move mode.
+    has_moved: bool,
 }
 
 impl<const N: usize> Moves<N> {
+    fn new() -> Self {
+        Moves {
+            waiting: VecDeque::new(),
+            sent: None,
+            ends: None,
+            has_moved: false,
+        }
+    }
+
     fn is_idle(&self) -> bool {
         self.sent.is_none() && self.ends.is_none()
     }
 
     fn clear(&mut self) {
-        *self = Moves {
-            waiting: VecDeque::new(),
-            sent: None,
-            ends: None,
-        };
+        *self = Moves::new();
+    }
+
+    /// Ends the trajectory if the arm has left the move mode: an operator's request or a fault must not be followed by the next
+    /// move. Returns whether this has ended it.
+    fn check_mode(&mut self, mode: Option<Mode>) -> bool {
+        let is_moving = mode == Some(Mode::Move);
+        let was_ended = self.has_moved && !is_moving && self.sent.is_none();
+        let had_more = !self.waiting.is_empty();
+        self.has_moved |= is_moving && self.ends.is_some();
+        if was_ended {
+            self.clear();
+        }
+        was_ended && had_more
     }
 }
 
@@ -114,11 +134,7 @@ impl<const N: usize> Bridge<N> {
             interval_ns: (1e9 / args.rate_hz) as u64,
             next_ns: 0,
             offset_ns: since_epoch_ns().saturating_sub(monotonic_ns()),
-            moves: Moves {
-                waiting: VecDeque::new(),
-                sent: None,
-                ends: None,
-            },
+            moves: Moves::new(),
         })
     }
 
@@ -129,6 +145,10 @@ impl<const N: usize> Bridge<N> {
     pub fn run(&mut self, stop: &Stop, tell: &dyn Fn(&str)) -> Result<(), RosError> {
         while !stop.shutdown_requested() {
             while let Some(telemetry) = self.reader.receive()? {
+                if telemetry.dof() == N && self.moves.check_mode(telemetry.record_of::<N>().mode())
+                {
+                    tell("the arm has left the move mode: the trajectory ends");
+                }
                 self.publish(&telemetry)?;
             }
             self.receive_trajectories(tell)?;
