@@ -1,4 +1,4 @@
-//! The monotonic clock.
+//! The monotonic clock, and the time of day.
 
 use rustix::io::Errno;
 use rustix::thread::clock_nanosleep_absolute;
@@ -9,6 +9,12 @@ const NS_PER_S: u64 = 1_000_000_000;
 /// Current time of the system's monotonic clock \[ns\].
 pub fn monotonic_ns() -> u64 {
     let now = clock_gettime(ClockId::Monotonic);
+    now.tv_sec.unsigned_abs() * NS_PER_S + now.tv_nsec.unsigned_abs()
+}
+
+/// Current time of day since the epoch \[ns\], for logs and viewers; no control depends on it.
+pub fn since_epoch_ns() -> u64 {
+    let now = clock_gettime(ClockId::Realtime);
     now.tv_sec.unsigned_abs() * NS_PER_S + now.tv_nsec.unsigned_abs()
 }
 

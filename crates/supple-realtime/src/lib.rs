@@ -23,7 +23,7 @@ mod stop;
 pub use settings::Settings;
 
 pub use background::BackgroundWriter;
-pub use clock::{monotonic_ns, sleep_until_ns};
+pub use clock::{monotonic_ns, since_epoch_ns, sleep_until_ns};
 pub use heartbeat::{Heartbeat, LivenessCounter, LivenessMonitor};
 pub use notify::{ManagerVariables, Notifier, NotifyError};
 pub use options::RealtimeOptions;

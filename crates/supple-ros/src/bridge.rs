@@ -7,7 +7,7 @@ use crate::trajectory::{self, Waypoint};
 use core::time::Duration;
 use std::collections::VecDeque;
 use std::sync::mpsc::Receiver;
-use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use std::time::Instant;
 use supple_cli::arguments::RosArgs;
 use supple_core::Config;
 use supple_core::controller::{Mode, Request};
@@ -15,7 +15,7 @@ use supple_ipc::message::{Outcome, Telemetry};
 use supple_ipc::{Domain, OperatorClient, TelemetryReader};
 use supple_log::{CycleTiming, Extras, LiveEncoder};
 use supple_model::Description;
-use supple_realtime::{Stop, monotonic_ns, pause};
+use supple_realtime::{Stop, monotonic_ns, pause, since_epoch_ns};
 
 /// Time between two polls. The queue of telemetry holds two seconds at 1 kHz.
 const POLL_INTERVAL: Duration = Duration::from_millis(2);
@@ -288,15 +288,4 @@ impl<const N: usize> Bridge<N> {
         }
         Ok(())
     }
-}
-
-#[expect(
-    clippy::disallowed_methods,
-    reason = "ROS 2 orders messages by the time of day; the system does not use it"
-)]
-fn since_epoch_ns() -> u64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.map_or(0, |since| {
-        u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
-    })
 }

@@ -6,12 +6,12 @@ use crate::hub::{Answer, Hub, PendingCommand};
 use crate::snapshot::{CycleExtras, SnapshotBuilder};
 use core::time::Duration;
 use std::sync::mpsc::{Receiver, Sender};
-use std::time::{Instant, SystemTime, UNIX_EPOCH};
+use std::time::Instant;
 use supple_ipc::message::{Drives, OperatorReply, Outcome, Telemetry};
 use supple_ipc::{Domain, OperatorClient, TelemetryReader};
 use supple_log::{CycleTiming, Extras, LiveEncoder};
 use supple_model::Description;
-use supple_realtime::{Stop, monotonic_ns, pause};
+use supple_realtime::{Stop, monotonic_ns, pause, since_epoch_ns};
 
 /// Id of the channel of snapshots; the ids of the log's channels follow.
 pub const VIEW_CHANNEL: u32 = 0;
@@ -209,15 +209,4 @@ fn in_words(reply: &OperatorReply) -> Answer {
 /// Returns the id of the channel of a message of the log.
 fn channel_of(index: usize) -> u32 {
     VIEW_CHANNEL + 1 + index as u32
-}
-
-#[expect(
-    clippy::disallowed_methods,
-    reason = "viewers order messages by the time of day; the system does not use it"
-)]
-fn since_epoch_ns() -> u64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.map_or(0, |since| {
-        u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
-    })
 }

@@ -2,7 +2,6 @@
 
 use std::fs;
 use std::path::Path;
-use std::time::{SystemTime, UNIX_EPOCH};
 use supple_cli::console::print_status;
 use supple_cli::exit::Failure;
 use supple_core::Config;
@@ -93,7 +92,7 @@ impl<const N: usize> Recorder<N> {
         let (start_ns, offset_ns) = match virtual_time {
             true => (0, 0),
             false => {
-                let now_ns = since_epoch_ns();
+                let now_ns = supple_realtime::since_epoch_ns();
                 (
                     now_ns,
                     now_ns.saturating_sub(supple_realtime::monotonic_ns()),
@@ -152,15 +151,4 @@ impl<const N: usize> Recorder<N> {
         self.writer.finish()?;
         Ok(())
     }
-}
-
-#[expect(
-    clippy::disallowed_methods,
-    reason = "a log in real time contains the time of its start; in virtual time this is not called"
-)]
-fn since_epoch_ns() -> u64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.map_or(0, |since| {
-        u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
-    })
 }
