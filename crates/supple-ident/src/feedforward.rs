@@ -58,13 +58,13 @@ fn each_sample<const N: usize>(
             &Vector3::zeros(),
         );
         // All of the dry friction, in the direction of the velocity.
-        let (dry_direction, dry_share) = (None, 1.0);
+        let (dry_direction, dry_share) = (None, Vector::repeat(1.0));
         let unscaled_nm = learned.torque_nm(
             &config.learned,
             &config.friction,
             &qd,
             dry_direction,
-            dry_share,
+            &dry_share,
         );
         // With the learned torque scales, and within the bounds.
         let whole = model + learned_torque_nm(&config.learned, &bounds, &model, &unscaled_nm);

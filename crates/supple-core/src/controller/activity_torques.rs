@@ -122,6 +122,18 @@ impl<const N: usize> State<N> {
         })
     }
 
+    /// Returns the fraction of each joint's dry friction that is fed forward, 0 to 1. In contact, joints whose presliding is known
+    /// have all of it, in the direction of their measured motion.
+    pub(super) fn dry_share(&self, config: &Config<N>) -> Vector<N> {
+        let measured = self.dry_direction.is_some() && self.held_friction(config).is_some();
+        Vector::from_fn(
+            |i, _| match measured && config.friction[i].presliding_rad > 0.0 {
+                true => 1.0,
+                false => self.latch.friction_share(),
+            },
+        )
+    }
+
     /// Returns the torques of gravity hold with joint damping, of the safe action, or zero without torque.
     pub(super) fn safe_torques(&self, controller: &Controller<N>) -> Torques<N> {
         let config = controller.config();

@@ -53,6 +53,8 @@ pub struct Latch {
     confirmed: bool,
     latched_s: f64,
     following_s: f64,
+    /// Whether the tip has followed the reference since its last reversal.
+    has_followed: bool,
     /// Time since the latch opened by itself \[s\].
     since_release_s: f64,
     residual: ResidualScale,
@@ -86,6 +88,7 @@ impl Latch {
             confirmed: false,
             latched_s: 0.0,
             following_s: 0.0,
+            has_followed: false,
             since_release_s: f64::MAX,
             residual,
             resting_force_n,
@@ -152,6 +155,7 @@ impl Latch {
         if direction.dot(&self.direction) <= 0.0 {
             self.since_reversal_s = 0.0;
             self.in_contact = false;
+            self.has_followed = false;
             self.direction = direction;
         } else if !self.in_contact {
             self.direction = direction;
@@ -179,12 +183,14 @@ impl Latch {
         self.force_against_n = -input.force_n.dot(&self.direction);
         let reversing = self.since_reversal_s < config.reversal_s;
         let configured_n = config.threshold_n + input.friction_uncertainty_n;
-        let factor = self.residual.factor() * if reversing { 2.0 } else { 1.0 };
-        self.threshold_n = configured_n * factor;
-        let pushed = self.force_against_n > self.threshold_n;
         let tip_m_per_s = input.tip_velocity_m_per_s.dot(&self.direction);
         let follows = self.reference_m_per_s > MIN_SPEED_M_PER_S
             && tip_m_per_s >= FOLLOWING_SHARE * self.reference_m_per_s;
+        let blocked = self.has_followed & !follows;
+        self.has_followed |= follows & !reversing;
+        let factor = self.residual.factor() * if reversing { 2.0 } else { 1.0 };
+        self.threshold_n = configured_n * factor;
+        let pushed = self.force_against_n > self.threshold_n;
         self.since_release_s += elapsed_s;
         if self.in_contact {
             self.latched_s += elapsed_s;
@@ -200,7 +206,7 @@ impl Latch {
             self.in_contact = true;
             self.confirmed = !follows || self.since_release_s < AGAIN_S;
             (self.latched_s, self.following_s) = (0.0, 0.0);
-        } else if self.share >= 1.0 && !reversing {
+        } else if self.share >= 1.0 && !reversing && !blocked {
             self.residual
                 .add(self.force_against_n / configured_n, elapsed_s);
         }

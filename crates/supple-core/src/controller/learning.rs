@@ -148,7 +148,7 @@ impl<const N: usize> State<N> {
         let scale = &terms.parameters.torque_scale;
         (
             Vector::from_fn(|i, _| (self.torque[i] - self.ripple[i]) / (1.0 + scale[i])),
-            learned.torque_nm(terms, &self.friction, velocity, None, 1.0),
+            learned.torque_nm(terms, &self.friction, velocity, None, &Vector::repeat(1.0)),
         )
     }
 
@@ -170,7 +170,7 @@ impl<const N: usize> State<N> {
             &self.friction,
             &velocity,
             self.dry_direction.as_ref(),
-            self.latch.friction_share(),
+            &self.dry_share(config),
         );
         if let Activity::Breakaway { ramp, .. } = &self.activity {
             change[ramp.joint] = 0.0;

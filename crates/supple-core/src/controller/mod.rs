@@ -17,6 +17,7 @@ pub mod latch;
 mod learned_ramp;
 mod learning;
 mod limiter;
+mod measured_direction;
 mod mode;
 mod motion_check;
 mod nullspace;

@@ -289,7 +289,7 @@ cycle! {
         flag in_contact;
         /// Learning is on: new learned terms are accepted.
         flag learning;
-        /// Share of the dry friction feed-forward applied, 0 to 1.
+        /// Share of the dry friction feed-forward applied, 0 to 1; joints with known presliding have all of it in contact.
         number friction_share;
         /// Smallest singular value of the active joints' linear Jacobian \[m\].
         number min_singular_value_m;

@@ -1,16 +1,20 @@
 //! Direction of the dry friction that the law feeds forward, for joints whose presliding travel is known.
 //!
 //! The direction follows the joint velocities of the reference, see [`crate::friction`]. While the reference rests, the
-//! direction fades, so that an arm at rest has no friction feed-forward; in contact it is frozen. Modes with stiff joint loops
-//! do not use it.
+//! direction fades, so that an arm at rest has no friction feed-forward. In contact the arm does not follow the reference: there the
+//! direction follows the measured angles, as the friction itself does, through the impact, the rebounds and the rest. Of the
+//! force on the obstacle then that of the spring remains; a direction from the reference would leave the difference
+//! between the fed-forward and the real friction, which is several times as large at low stiffness. In free motion the measured
+//! direction would make the arm unstable where the model has too much friction. Modes with stiff joint loops do not use either.
 //!
 //! The joint velocities are computed for a tip at its reference. At the measured pose the same tip velocity gives others: at
 //! 5 N/m the tip is millimetres away from its reference, and a joint that does not move along the reference would seem to
 //! move by some milliradians, over which its dry friction reverses.
 
+use super::Controller;
 use super::activity::Activity;
 use super::state::State;
-use crate::config::{Config, FrictionVelocity};
+use crate::config::FrictionVelocity;
 use crate::dynamics::Terms;
 use crate::law::impedance::Task;
 use crate::math::{Vector, Vector3, abs, exp, sqrt};
@@ -28,11 +32,15 @@ impl<const N: usize> State<N> {
     #[inline(never)]
     pub(super) fn update_dry_direction(
         &mut self,
-        config: &Config<N>,
+        controller: &Controller<N>,
         tracking: Option<(&Task<N>, &Reference)>,
         pose: bool,
         elapsed_s: f64,
     ) {
+        let config = controller.config();
+        let play_rad = self.stuck_encoders.resolution_rad(controller.encoders());
+        self.measured_direction
+            .update(&config.friction, &self.position, &play_rad);
         let tracks = matches!(self.activity, Activity::Track(_) | Activity::SetPoints(_))
             && config.law.friction_velocity == FrictionVelocity::Reference
             && !pose;
@@ -43,11 +51,14 @@ impl<const N: usize> State<N> {
         let mut directions = self.dry_direction.unwrap_or_else(Vector::zeros);
         let velocity = velocity_at_reference(&self.terms, task, reference);
         let in_contact = self.latch.in_contact();
+        let blocked = in_contact && config.latch.fade && config.latch.hold_friction;
         for (i, friction) in config.friction.iter().enumerate() {
             let direction = directions[i];
             let rests = abs(velocity[i]) < REST_SHARE * friction.band_rad_per_s;
             directions[i] = if friction.presliding_rad == 0.0 {
                 friction.direction(velocity[i])
+            } else if blocked {
+                self.measured_direction.of_joint(i)
             } else if in_contact {
                 direction
             } else if rests {

@@ -5,6 +5,7 @@ use super::activity::Activity;
 use super::fault::{Fault, SafeAction};
 use super::gain_ramp::GainRamp;
 use super::handover::{Handover, HandoverFrom, REPEATED_CYCLES};
+use super::measured_direction::MeasuredDirection;
 use super::mode::Mode;
 use super::oscillation::Oscillation;
 use super::output::Input;
@@ -54,6 +55,8 @@ pub struct State<const N: usize> {
     pub(super) friction: [Friction; N],
     /// Direction of the dry friction to feed forward; `None`: the direction of the velocity.
     pub(super) dry_direction: Option<Vector<N>>,
+    /// Direction of the dry friction according to the measured motion.
+    pub(super) measured_direction: MeasuredDirection<N>,
     pub(super) gains: GainRamp<Gains>,
     pub(super) joint_gains: GainRamp<JointGains<N>>,
     pub(super) pose_gains: PoseGainRamps,
@@ -109,6 +112,7 @@ impl<const N: usize> State<N> {
             contact_velocity_rad_per_s: Vector::zeros(),
             friction: config.friction,
             dry_direction: None,
+            measured_direction: MeasuredDirection::unknown(),
             gains: GainRamp::at_rest(config.law.gains),
             joint_gains: GainRamp::at_rest(config.joint_gains),
             pose_gains: PoseGainRamps::at_rest(&config.law.gains, &config.pose.gains),

@@ -95,7 +95,7 @@ pub fn step<const N: usize>(
     state.supervise_stop(controller, &tip_velocity, elapsed_s);
     if controller.has_presliding() {
         let tracking = task.as_ref().zip(reference.as_ref());
-        state.update_dry_direction(config, tracking, pose.is_some(), elapsed_s);
+        state.update_dry_direction(controller, tracking, pose.is_some(), elapsed_s);
     }
 
     let mut torques = state.activity_torques(

@@ -50,7 +50,7 @@ pub struct LawInput<'a, T, const N: usize, const D: usize = 3> {
     pub friction: Option<(&'a [Friction; N], FrictionVelocity)>,
     /// Direction of each joint's dry friction, -1 to 1; `None`: the direction of the velocity.
     pub dry_direction: Option<&'a Vector<N>>,
-    /// Share of the dry friction feed-forward to apply, 0 to 1.
+    /// Share of the dry friction feed-forward to apply, 0 to 1. Joints with presliding have all of it while `held_friction` is given.
     pub friction_share: f64,
     /// Friction of an arm that is blocked.
     pub held_friction: Option<HeldFriction<'a, N>>,
@@ -105,7 +105,8 @@ impl<'a, T, const N: usize> LawInput<'a, T, N> {
 }
 
 /// Friction feed-forward of a blocked arm: joints at rest have no viscous friction, and their dry
-/// friction keeps the value from when they came to rest, independent of the reference.
+/// friction keeps the value from when they came to rest, independent of the reference. Where presliding is known, only its
+/// magnitude keeps that value; its direction is given.
 #[derive(Clone, Copy, Debug)]
 pub struct HeldFriction<'a, const N: usize> {
     /// Joint velocities of the reference when the arm was blocked \[rad/s\].
@@ -117,6 +118,22 @@ pub struct HeldFriction<'a, const N: usize> {
 }
 
 impl<const N: usize> HeldFriction<'_, N> {
+    /// Returns the feed-forward of `joint` at `velocity_rad_per_s` with dry friction in the `direction` of the measured motion
+    /// \[N m\]. Requires presliding.
+    fn in_direction_nm(
+        &self,
+        friction: &Friction,
+        joint: usize,
+        velocity_rad_per_s: f64,
+        direction: f64,
+    ) -> f64 {
+        let kept_nm = friction.dry_size_nm(self.velocity_rad_per_s[joint]);
+        let dry_nm = friction.dry_size_nm(velocity_rad_per_s);
+        self.viscous_share * friction.viscous_nm_s_per_rad * velocity_rad_per_s
+            + friction.offset_nm
+            + (dry_nm + self.weight * (kept_nm - dry_nm)) * direction
+    }
+
     /// Returns the correction of the feed-forward of `joint` at `velocity_rad_per_s` \[N m\]; `share` is the applied fraction of
     /// its dry part `dry_nm`.
     fn difference_nm(
@@ -245,15 +262,18 @@ pub(super) fn add_law_terms<T: Target<D>, F: TermSink<N, D>, const N: usize, con
                 Some(of) => friction[i].torque_in_direction_nm(velocity, of[i], share),
                 None => friction[i].torque_with_dry_share_nm(velocity, share),
             };
-            match &input.held_friction {
-                Some(held) => {
+            match (&input.held_friction, input.dry_direction) {
+                (Some(held), Some(of)) if friction[i].presliding_rad > 0.0 => {
+                    held.in_direction_nm(&friction[i], i, velocity, of[i])
+                }
+                (Some(held), _) => {
                     let dry_nm = match input.dry_direction {
                         Some(of) => friction[i].dry_size_nm(velocity) * of[i],
                         None => friction[i].dry_torque_nm(velocity),
                     };
                     torque_nm + held.difference_nm(&friction[i], i, velocity, dry_nm, share)
                 }
-                None => torque_nm,
+                (None, _) => torque_nm,
             }
         };
         sink.add(|t| &mut t.friction, Torque(Vector::from_fn(feed_forward)));

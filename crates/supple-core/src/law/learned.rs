@@ -78,7 +78,7 @@ impl<const N: usize> LearnedAtPose<N> {
         LearnedAtPose { static_nm, dry_nm }
     }
 
-    /// Torque at joint velocities `velocity_rad_per_s`, with a fraction `dry_share` of the dry friction \[N m\] in the
+    /// Torque at joint velocities `velocity_rad_per_s`, with a fraction `dry_share` of each joint's dry friction \[N m\] in the
     /// direction of the velocity, or in a given `dry_direction`.
     pub fn torque_nm(
         &self,
@@ -86,13 +86,13 @@ impl<const N: usize> LearnedAtPose<N> {
         friction: &[Friction; N],
         velocity_rad_per_s: &Vector<N>,
         dry_direction: Option<&Vector<N>>,
-        dry_share: f64,
+        dry_share: &Vector<N>,
     ) -> Vector<N> {
         let viscous = &learned.parameters.viscous_nm_s_per_rad;
         Vector::from_fn(|i, _| {
             let v = velocity_rad_per_s[i];
             let direction = dry_direction.map_or_else(|| friction[i].direction(v), |of| of[i]);
-            self.static_nm[i] + viscous[i] * v + self.dry_nm[i] * direction * dry_share
+            self.static_nm[i] + viscous[i] * v + self.dry_nm[i] * direction * dry_share[i]
         })
     }
 }

@@ -233,3 +233,24 @@ fn contact_that_stops_the_tip_stays_closed() {
     let cycles = open_after(&mut latch, &config, &against(0.5, 0.0));
     assert_eq!(cycles, u32::MAX);
 }
+
+/// The force of an obstacle is no residual of free motion: a tip that pressed below the threshold would raise it for ever.
+#[test]
+fn a_blocked_tip_does_not_raise_the_threshold() {
+    let config = ContactLatch {
+        false_alarms_per_hour: 1.0,
+        ..latch()
+    };
+    let mut latch = moving(&config);
+    (0..5000).for_each(|k| cycle_of(&mut latch, &config, &following(f64::from(k % 2))));
+    cycle_of(&mut latch, &config, &against(0.0, 0.0));
+    let free_n = latch.threshold_n();
+    assert!(free_n > 1.1 * config.threshold_n, "{free_n} N");
+    for k in 0..3000 {
+        let pressed_n = 0.99 * free_n * f64::from(k) / 3000.0;
+        cycle_of(&mut latch, &config, &against(pressed_n, 0.0));
+        assert!(!latch.in_contact());
+        assert_eq!(latch.threshold_n(), free_n);
+    }
+    close(&mut latch, &config, &against(1.01 * free_n, 0.0));
+}

@@ -266,6 +266,54 @@ fn contact_removes_the_dry_friction_torque() {
     assert!(norm(&fading) < 0.5 * norm(&pushing));
 }
 
+/// Where presliding is known, the dry friction of a blocked arm has the direction of the measured motion: all of it stays on, a rebound
+/// reverses it as it reverses the real friction (Dahl 1968), and the motion of the reference does not change it.
+#[test]
+fn in_contact_known_presliding_follows_the_measured_motion() {
+    const PRESLIDING_RAD: f64 = 1e-3;
+    let mut config = config(|latch| {
+        latch.contact_share = 0.2;
+        latch.hold_friction = true;
+    });
+    config.friction = friction().map(|friction: Friction| Friction {
+        offset_nm: 0.0,
+        breakaway_nm: friction.coulomb_nm,
+        presliding_rad: PRESLIDING_RAD,
+        ..friction
+    });
+    let mut bench = Bench::new(config);
+    bench.cycles(700, up(0.0));
+    let touched = bench.cycles(200, up(12.0));
+    let output = &touched[199];
+    assert!(output.in_contact && output.friction_share == 0.2);
+    let dry = |output: &Output<3>| {
+        Vector::<3>::from_fn(|i, _| output.torques.friction[i] / config.friction[i].coulomb_nm)
+    };
+    let before = dry(output);
+    assert!(before[1].abs() > 0.9, "{before}");
+    // The plant stops; its joints rebound by two presliding distances.
+    let mut rig = bench.rig.clone();
+    let mut last = *output;
+    for _ in 0..100 {
+        for i in 1..3 {
+            rig.q[i] -= before[i].signum() * 2.0 * PRESLIDING_RAD / 100.0;
+        }
+        last = rig.cycle();
+        assert!(last.in_contact && last.fault.is_none());
+    }
+    for i in 1..3 {
+        let back = -before[i].signum();
+        let reversed = back + (before[i] - back) * f64::exp(-2.0);
+        let found = dry(&last)[i];
+        assert!(
+            (found - reversed).abs() < 0.1,
+            "joint {i}: {found}, {reversed}"
+        );
+    }
+    let at_rest = rig.cycles(300);
+    assert_eq!(dry(&at_rest), dry(&last));
+}
+
 /// Larger friction, or a less accurate friction model, raises the threshold.
 #[test]
 fn friction_uncertainty_raises_the_threshold() {

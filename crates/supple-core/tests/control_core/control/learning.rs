@@ -170,7 +170,7 @@ fn learned_map_adds_no_energy() {
                 &Vector3::zeros(),
             );
             work += at
-                .torque_nm(&learned, &config.friction, &qd, None, 1.0)
+                .torque_nm(&learned, &config.friction, &qd, None, &Vector::repeat(1.0))
                 .dot(&qd)
                 * h;
         }
