@@ -24,6 +24,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         trajectory: Trajectory::Probe(probe),
         duration_s,
         learning: false,
+        gain_change: None,
     };
     let mut ratios = Vec::new();
     for _ in 0..ROUNDS {

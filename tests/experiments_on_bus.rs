@@ -74,6 +74,7 @@ fn in_one_process(trajectory: Trajectory, duration_s: f64, scene: Scene) -> (f64
         trajectory,
         duration_s,
         learning: false,
+        gain_change: None,
     };
     let mut forces = Vec::new();
     let run = run(&plan, &mut |cycle, _| {

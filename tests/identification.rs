@@ -301,6 +301,7 @@ fn a_friction_error_of_10_percent_is_learnt_within_four_periods() {
             trajectory,
             duration_s: 8.5,
             learning: false,
+            gain_change: None,
         };
         let mut rows: Vec<(f64, Vector<4>, Vector<4>)> = Vec::new();
         let done = run(&plan, &mut |cycle, time_s| {

@@ -30,6 +30,7 @@ fn plan(deviation: Deviation, (trajectory, duration_s): (Trajectory, f64)) -> Pl
         trajectory,
         duration_s,
         learning: true,
+        gain_change: None,
     }
 }
 

@@ -176,6 +176,7 @@ fn plan<const N: usize>(arms: &Arms<'_>, options: &Options) -> Result<Plan<N>, E
         trajectory,
         duration_s: options.duration_s.unwrap_or(whole_s),
         learning: options.learning,
+        gain_change: None,
     })
 }
 

@@ -63,6 +63,7 @@ fn sized<const N: usize>(
             trajectory,
             duration_s: DURATION_S,
             learning: false,
+            gain_change: None,
         };
         let found = run(&plan, &mut |_, _| Ok(()))?;
         if !found.rms_error_m.is_finite() {

@@ -35,6 +35,7 @@ fn main() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
                     trajectory,
                     duration_s,
                     learning: false,
+                    gain_change: None,
                 };
                 run(&plan, &mut |_, _| Ok(()))
             };

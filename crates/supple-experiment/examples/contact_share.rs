@@ -148,6 +148,7 @@ fn probe<const N: usize>(
         trajectory: Trajectory::Probe(probe),
         duration_s: probe.cycle_s(),
         learning: false,
+        gain_change: None,
     };
     Ok(median_stroke(&strokes(&plan)?))
 }

@@ -72,6 +72,7 @@ fn free_plan(setup: &Setup<4>, seed: u64) -> Result<Plan<4>, ExperimentError> {
         trajectory,
         duration_s,
         learning: false,
+        gain_change: None,
     })
 }
 
@@ -89,6 +90,7 @@ fn probing_plan(
         trajectory: Trajectory::Probe(probe),
         duration_s: probe.cycle_s(),
         learning: false,
+        gain_change: None,
     };
     Ok((plan, probe))
 }

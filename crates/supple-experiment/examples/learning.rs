@@ -38,6 +38,7 @@ fn track(
         trajectory,
         duration_s,
         learning,
+        gain_change: None,
     };
     let (mut late, mut terms) = (Rms::default(), learned);
     let run = run(&plan, &mut |cycle, time_s| {
@@ -71,6 +72,7 @@ fn probing(
     config.law.gains = scenario::gains(stiffness_n_per_m);
     config.learned = learned.unwrap_or(config.learned);
     let plan = Plan {
+        gain_change: None,
         name: "probing".to_owned(),
         config,
         plant: setup.plant(&Variant::EXACT, scenario::block()),

@@ -1,7 +1,9 @@
 //! Runs all experiments of the paper.
 
 use crate::adapted::{Adapted, JobOutcome, expected_s, may_adapt, perform};
+use crate::calibrated_runs::{CalibratedRuns, SEED_S, calibrated_seed};
 use crate::demo_options::DemoOptions;
+use crate::effects::{calibrated, result_or_error};
 use crate::error::ExperimentError;
 use crate::job::{
     Job, JobResult, ProbingVariant, QUADRANT, QUADRANT_FAST, QUADRANT_PERTURBED, SEEDS, SPEEDS,
@@ -9,7 +11,6 @@ use crate::job::{
 };
 use crate::metrics::{LineFit, spread};
 use crate::probing::{Stroke, median_stroke};
-use crate::realistic::{REALISTIC_S, RealisticRuns, realistic_seed};
 use crate::run::Run;
 use crate::scenario;
 use crate::setup::Setup;
@@ -21,6 +22,9 @@ use rayon::prelude::*;
 use supple_core::trajectory::Quadrant;
 use supple_model::{Description, Paths, tip_weight_n, with_dof};
 use supple_plant::PlantOptions;
+
+/// Maximum number of calibrated arms without effects of a real one.
+const IDEAL_SEEDS: u64 = 3;
 
 /// Progress of the demo.
 #[derive(Clone, Debug)]
@@ -88,11 +92,32 @@ fn sized<const N: usize>(
         None => Setup::<N>::new(description, options.seed)?,
     };
     let setup = setup.with_plant_options(&options.plant)?;
+    let model = match options.model {
+        Some(_) => None,
+        None => Some(result_or_error(calibrated::<N>(
+            description,
+            &options.plant,
+            options.seed,
+        ))?),
+    };
+    let probing_setup = match &model {
+        Some(Ok(model)) => Setup::<N>::with_model(description, model, options.seed)?
+            .with_plant_options(&options.plant)?,
+        _ => setup.clone(),
+    };
+    let setup_of = |job: &Job| match job.uses_identified_model() {
+        true => &probing_setup,
+        false => &setup,
+    };
     let (realistic_plant, realistic_model) = realistic_arm(description, options);
     let jobs = jobs();
     let expected = |job: &Job| expected_s(job, &setup, options.seed);
     let seeds = options.realistic_seeds;
-    let total_s = jobs.iter().map(expected).sum::<f64>() + seeds as f64 * REALISTIC_S;
+    let ideal_seeds = match options.plant.is_none() && options.model.is_none() {
+        true => seeds.min(IDEAL_SEEDS),
+        false => 0,
+    };
+    let total_s = jobs.iter().map(expected).sum::<f64>() + (seeds + ideal_seeds) as f64 * SEED_S;
     let done_s = std::sync::Mutex::new(0.0);
     let report = |duration_s: f64, finished: String| {
         let mut done_s = done_s
@@ -108,7 +133,7 @@ fn sized<const N: usize>(
     let results = jobs
         .par_iter()
         .map(|job| {
-            let done = perform(job, &setup, description, options)?;
+            let done = perform(job, setup_of(job), description, options)?;
             report(expected(job), job.name());
             Ok(done)
         })
@@ -116,15 +141,31 @@ fn sized<const N: usize>(
     let adapted = results.iter().filter_map(|done| done.adapted.clone());
     let adapted: Vec<Adapted> = adapted.collect();
     let results = results.into_iter().map(|done| done.result).collect();
-    let realistic = (0..seeds).into_par_iter().map(|offset| {
-        let seed = options.seed.wrapping_add(offset);
-        let done = realistic_seed::<N>(description, realistic_model, &realistic_plant, seed)?;
-        report(REALISTIC_S, format!("realistic, seed {seed}"));
-        Ok(done)
-    });
-    let realistic = realistic.collect::<Result<Vec<_>, ExperimentError>>()?;
-    let realistic = (seeds > 0).then(|| RealisticRuns::of(&realistic));
-    let mut demo = assemble(description, options, &jobs, results, realistic);
+    let runs = |name: &'static str, plant: &PlantOptions, count: u64| {
+        let of_seed = |offset: u64| {
+            let seed = options.seed.wrapping_add(offset);
+            let found = match (realistic_model, &model) {
+                (Some(given), _) => Ok(given.clone()),
+                (None, Some(first)) if offset == 0 && *plant == options.plant => first.clone(),
+                _ => result_or_error(calibrated::<N>(description, plant, seed))?,
+            };
+            let done = match found {
+                Ok(model) => calibrated_seed::<N>(description, &model, plant, seed)?,
+                Err(reason) => Err(reason),
+            };
+            report(SEED_S, format!("{name} plant, seed {seed}"));
+            Ok(done)
+        };
+        let found = (0..count).into_par_iter().map(of_seed);
+        let found = found.collect::<Result<Vec<_>, ExperimentError>>()?;
+        Ok::<_, ExperimentError>((count > 0).then(|| CalibratedRuns::of(&found)))
+    };
+    let realistic = runs("realistic", &realistic_plant, seeds)?;
+    let ideal = runs("ideal", &options.plant, ideal_seeds)?;
+    let mut demo = assemble(description, options, &jobs, results);
+    demo.summary.realistic = realistic;
+    demo.summary.ideal = ideal;
+    demo.summary.not_identified = model.and_then(Result::err);
     demo.summary.adapted = adapted;
     if may_adapt(description, options) {
         let tip_weight_n = tip_weight_n::<N>(description)?;
@@ -256,7 +297,6 @@ fn assemble(
     options: &DemoOptions,
     jobs: &[Job],
     done: Vec<JobResult>,
-    realistic: Option<RealisticRuns>,
 ) -> Demo {
     let mut results = JobResults {
         paths: description.paths(),
@@ -302,7 +342,9 @@ fn assemble(
             source.unwrap_or_else(|| model.name().to_owned())
         }),
         plant: options.plant.clone(),
-        realistic,
+        realistic: None,
+        ideal: None,
+        not_identified: None,
         sinusoid: tracking(headline),
         sinusoid_by_speed: sinusoids
             .iter()

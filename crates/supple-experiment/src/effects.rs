@@ -8,7 +8,7 @@
 use crate::calibrate::{Calibration, calibrate};
 use crate::error::ExperimentError;
 use crate::metrics::Rms;
-use crate::run::{FaultEnd, Plan, run};
+use crate::run::{FaultEnd, GainChange, Plan, run};
 use crate::scenario;
 use crate::setup::{Setup, Variant};
 use rayon::prelude::*;
@@ -20,6 +20,8 @@ use supple_plant::{PlantOptions, Scene};
 
 /// Time of motion after which the error of a learning controller is measured: three periods of the sinusoid \[s\].
 pub const LEARNING_S: f64 = 24.0;
+/// Duration of the change to a lower stiffness \[s\].
+const CHANGE_S: f64 = 2.0;
 
 /// An effect with its size.
 #[derive(Clone, Debug, PartialEq)]
@@ -205,19 +207,26 @@ fn run_effect<const N: usize>(
     models: &[ModelSource],
     seed: u64,
 ) -> Result<Vec<EffectRun>, ExperimentError> {
-    let track = |model: ModelSource| {
-        let setup = match model {
-            ModelSource::Nominal => Setup::<N>::new(description, seed)?,
-            ModelSource::Calibrated | ModelSource::Learning => {
-                let found = calibrated::<N>(description, &effect.options, seed)?;
-                Setup::<N>::with_model(description, &found, seed)?
-            }
-        };
-        let learning = model == ModelSource::Learning;
-        free_motion(&setup.with_plant_options(&effect.options)?, learning)
+    let nominal = models.iter().all(|model| *model == ModelSource::Nominal);
+    let found = match nominal {
+        true => Err("no calibration was asked for".to_owned()),
+        false => result_or_error(calibrated::<N>(description, &effect.options, seed))?,
+    };
+    let track = |setup: Setup<N>, learning| {
+        let setup = setup.with_plant_options(&effect.options)?;
+        free_motion(&setup, learning)
     };
     let run = |model: &ModelSource| {
-        let found = result_or_error(track(*model))?;
+        let found = match (model, &found) {
+            (ModelSource::Nominal, _) => {
+                result_or_error(track(Setup::new(description, seed)?, false))?
+            }
+            (_, Err(reason)) => Err(reason.clone()),
+            (model, Ok(found)) => {
+                let setup = Setup::with_model(description, found, seed)?;
+                result_or_error(track(setup, *model == ModelSource::Learning))?
+            }
+        };
         Ok(EffectRun {
             effect: effect.name,
             model: *model,
@@ -284,46 +293,90 @@ pub fn free_motion_at<const N: usize>(
     stiffness_n_per_m: f64,
     learning: bool,
 ) -> Result<FreeMotion, ExperimentError> {
-    let mut false_latches = 0;
-    let learning_s = if learning { LEARNING_S } else { 0.0 };
-    let mut track = |name: &str, (trajectory, duration_s): (Trajectory, f64)| {
-        let mut config = setup.config(&Variant::EXACT)?;
-        config.law.gains = scenario::gains_like(&config.law.gains, stiffness_n_per_m);
-        let plan = Plan {
-            name: name.to_owned(),
-            config,
-            plant: setup.plant(&Variant::EXACT, Scene::default()),
-            trajectory,
-            duration_s: learning_s + duration_s,
-            learning,
-        };
-        let mut latched = false;
-        let mut error = Rms::default();
-        let run = run(&plan, &mut |cycle, time_s| {
-            if let (Some(time_s), Some(reference)) = (time_s, cycle.output.reference)
-                && time_s >= learning_s
-            {
-                error.add((reference.position - cycle.truth.tip_position_m).norm());
-            }
-            let now = time_s.is_some() && cycle.output.in_contact;
-            false_latches += usize::from(now && !latched);
-            latched = now;
-            Ok(())
-        })?;
-        // After a fault while learning, the error before the fault is the result.
-        let rms_m = if error.is_empty() {
-            run.rms_error_m
-        } else {
-            error.rms()
-        };
-        Ok::<_, ExperimentError>((rms_m, run.ended))
+    let measured_from_s = if learning { LEARNING_S } else { 0.0 };
+    let tracking = Tracking {
+        stiffness_n_per_m,
+        learning,
+        change: None,
+        measured_from_s,
     };
-    let (sinusoid_rms_m, sinusoid_ended) = track("sinusoid", setup.paths().sinusoid(1.0))?;
-    let (arc_rms_m, arc_ended) = track("arc", setup.paths().arc(1.0))?;
-    Ok(FreeMotion {
-        sinusoid_rms_m,
-        arc_rms_m,
-        false_latches,
-        ended: sinusoid_ended.or(arc_ended),
-    })
+    tracking.run(setup)
+}
+
+/// Tracks the sinusoid and the arc at 5 N/m for [`LEARNING_S`] while learning, then changes to another stiffness, and measures the
+/// error after that change.
+///
+/// # Errors
+/// As [`free_motion`].
+pub fn soft_motion<const N: usize>(
+    setup: &Setup<N>,
+    stiffness_n_per_m: f64,
+) -> Result<FreeMotion, ExperimentError> {
+    let tracking = Tracking {
+        stiffness_n_per_m: scenario::STIFFNESS_N_PER_M,
+        learning: true,
+        change: Some(stiffness_n_per_m),
+        measured_from_s: LEARNING_S + CHANGE_S,
+    };
+    tracking.run(setup)
+}
+
+struct Tracking {
+    stiffness_n_per_m: f64,
+    learning: bool,
+    /// Stiffness after [`LEARNING_S`] \[N/m\].
+    change: Option<f64>,
+    measured_from_s: f64,
+}
+
+impl Tracking {
+    fn run<const N: usize>(&self, setup: &Setup<N>) -> Result<FreeMotion, ExperimentError> {
+        let mut false_latches = 0;
+        let mut track = |name: &str, (trajectory, duration_s): (Trajectory, f64)| {
+            let mut config = setup.config(&Variant::EXACT)?;
+            let law = config.law.gains;
+            config.law.gains = scenario::gains_like(&law, self.stiffness_n_per_m);
+            let plan = Plan {
+                name: name.to_owned(),
+                config,
+                plant: setup.plant(&Variant::EXACT, Scene::default()),
+                trajectory,
+                duration_s: self.measured_from_s + duration_s,
+                learning: self.learning,
+                gain_change: self.change.map(|stiffness_n_per_m| GainChange {
+                    time_s: LEARNING_S,
+                    gains: scenario::gains_like(&law, stiffness_n_per_m),
+                    ramp_s: CHANGE_S,
+                }),
+            };
+            let mut latched = false;
+            let mut error = Rms::default();
+            let run = run(&plan, &mut |cycle, time_s| {
+                if let (Some(time_s), Some(reference)) = (time_s, cycle.output.reference)
+                    && time_s >= self.measured_from_s
+                {
+                    error.add((reference.position - cycle.truth.tip_position_m).norm());
+                }
+                let now = time_s.is_some() && cycle.output.in_contact;
+                false_latches += usize::from(now && !latched);
+                latched = now;
+                Ok(())
+            })?;
+            // After a fault while learning, the error before the fault is the result.
+            let rms_m = if error.is_empty() {
+                run.rms_error_m
+            } else {
+                error.rms()
+            };
+            Ok::<_, ExperimentError>((rms_m, run.ended))
+        };
+        let (sinusoid_rms_m, sinusoid_ended) = track("sinusoid", setup.paths().sinusoid(1.0))?;
+        let (arc_rms_m, arc_ended) = track("arc", setup.paths().arc(1.0))?;
+        Ok(FreeMotion {
+            sinusoid_rms_m,
+            arc_rms_m,
+            false_latches,
+            ended: sinusoid_ended.or(arc_ended),
+        })
+    }
 }

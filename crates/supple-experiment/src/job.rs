@@ -55,9 +55,9 @@ pub(crate) enum Job {
 /// Variant of a probing run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ProbingVariant {
-    /// Perturbed model, friction feed-forward fades in contact.
+    /// Model identified on the arm; the latch changes the friction feed-forward in contact.
     Plain,
-    /// The friction feed-forward stays on.
+    /// Perturbed model, the friction feed-forward stays on.
     FadeOff,
     /// The plant's own parameters.
     Exact,
@@ -167,6 +167,18 @@ impl Job {
     /// Returns whether a fault is an expected result, as with the equation as printed.
     pub fn may_fault(&self) -> bool {
         *self == Job::LawAsPrinted
+    }
+
+    /// Returns whether the controller has the model that was identified on the arm, if there is one.
+    pub fn uses_identified_model(&self) -> bool {
+        use ProbingVariant::{ApparentInertia, Plain, Rubber};
+        matches!(
+            self,
+            Job::Probing {
+                kind: Plain | Rubber | ApparentInertia,
+                ..
+            }
+        )
     }
 
     pub fn name(&self) -> String {
@@ -302,6 +314,7 @@ impl Job {
             trajectory,
             duration_s,
             learning: false,
+            gain_change: None,
         })
     }
 

@@ -22,6 +22,7 @@
 //!     trajectory,
 //!     duration_s: 1.0,
 //!     learning: false,
+//!     gain_change: None,
 //! };
 //! let run = run(&plan, &mut |_cycle, _time_s| Ok(()))?;
 //! assert!(run.ended.is_none() && run.rms_error_m < 0.02);
@@ -36,6 +37,7 @@ mod adapted;
 mod approach_time;
 mod breakaway;
 pub mod calibrate;
+mod calibrated_runs;
 mod demo;
 mod demo_options;
 mod deviation;
@@ -50,7 +52,6 @@ mod pose;
 pub mod probing;
 pub mod procedure;
 mod quadrant;
-mod realistic;
 mod record;
 mod recorded_logs;
 mod request_sequence;
@@ -72,6 +73,7 @@ pub use adapted::Adapted;
 pub use approach_time::approach_s;
 pub use breakaway::{JointBreakaway, RATE_NM_PER_S, STOP_RAD, breakaway};
 pub use calibrate::{Calibration, CalibrationResult, ModelAccuracy, calibrate};
+pub use calibrated_runs::{CalibratedRuns, PressingForces, SeedFailure, SeedFault};
 pub use demo::{Demo, ProbingRun, Progress, demo};
 pub use demo_options::DemoOptions;
 pub use deviation::Deviation;
@@ -80,7 +82,6 @@ pub use excite::{constant_speed_runs, excitation, slow_motion};
 pub use mismatch::Mismatch;
 pub use pose::{PoseMotion, PoseTracking, pose_start, track_pose};
 pub use quadrant::{SegmentErrorAccumulator, SegmentPass};
-pub use realistic::{RealisticRuns, SeedFailure, SeedFault};
 pub use record::Recorder;
 pub use request_sequence::{Recording, RequestSequence, Step, StepCallback};
 pub use residual_error::{
@@ -89,7 +90,7 @@ pub use residual_error::{
 };
 pub use rig::{Cycle, Rig};
 pub use ripple::identify_ripple;
-pub use run::{CycleCallback, FaultEnd, Plan, Run, run};
+pub use run::{CycleCallback, FaultEnd, GainChange, Plan, Run, run};
 pub use setup::{Setup, Variant};
 pub use start::{active_joints, start_pose};
 pub use trace::{JointTorque, Sample, Trace};

@@ -2,7 +2,7 @@
 
 use crate::error::ExperimentError;
 use crate::metrics::{Mean, median};
-use crate::run::{Plan, run};
+use crate::run::{FaultEnd, Plan, run};
 use serde::Serialize;
 use supple_core::dynamics::{crba, jacobian};
 use supple_core::nalgebra::Vector3;
@@ -51,22 +51,45 @@ pub struct Stroke {
     pub latched_after_s: Option<f64>,
 }
 
+/// Strokes of a probing run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Strokes {
+    /// The strokes.
+    pub strokes: Vec<Stroke>,
+    /// The fault that ended the run early; the last stroke is then incomplete.
+    pub ended: Option<FaultEnd>,
+}
+
 /// Runs a plan whose trajectory is a [`Probe`]; returns its strokes, none for another trajectory.
 ///
 /// # Errors
 /// As [`run()`].
 pub fn strokes<const N: usize>(plan: &Plan<N>) -> Result<Vec<Stroke>, ExperimentError> {
+    Ok(probe(plan)?.strokes)
+}
+
+/// Does the same as [`strokes`]; also returns the fault that ended the run.
+///
+/// # Errors
+/// As [`run()`].
+pub fn probe<const N: usize>(plan: &Plan<N>) -> Result<Strokes, ExperimentError> {
     let Trajectory::Probe(probe) = plan.trajectory else {
-        return Ok(Vec::new());
+        return Ok(Strokes {
+            strokes: Vec::new(),
+            ended: None,
+        });
     };
     let mut contact = ContactAccumulator::new(probe);
-    run(plan, &mut |cycle, time_s| {
+    let run = run(plan, &mut |cycle, time_s| {
         if let Some(time_s) = time_s {
             contact.add_cycle(time_s, &cycle.truth, cycle.steps, &cycle.output);
         }
         Ok(())
     })?;
-    Ok(contact.finish())
+    Ok(Strokes {
+        strokes: contact.finish(),
+        ended: run.ended,
+    })
 }
 
 /// Phase of the first impact of a stroke.

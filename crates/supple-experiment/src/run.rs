@@ -7,6 +7,7 @@ use crate::rig::{Cycle, Rig};
 use crate::start::{active_joints, start_pose};
 use crate::trace::{JointTorque, Sample, Trace, xyz};
 use serde::Serialize;
+use supple_core::config::Gains;
 use supple_core::controller::{JointLabel, LearningSwitch, Mode, NamesJoints, Request};
 use supple_core::dynamics::tip_pose;
 use supple_core::{Config, Controller, Trajectory, Vector};
@@ -39,6 +40,19 @@ pub struct Plan<const N: usize> {
     pub duration_s: f64,
     /// Whether the model is refined while the arm moves.
     pub learning: bool,
+    /// Change of the gains while the arm tracks.
+    pub gain_change: Option<GainChange>,
+}
+
+/// A request for other gains while the arm tracks a trajectory.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GainChange {
+    /// Time of the request since the start of the trajectory \[s\].
+    pub time_s: f64,
+    /// The new gains.
+    pub gains: Gains,
+    /// Duration of the change \[s\].
+    pub ramp_s: f64,
 }
 
 /// A fault that ended a run.
@@ -116,6 +130,8 @@ pub fn run<const N: usize>(
     let move_at = cycles(SETTLE_S);
     let track_at = move_at + cycles(move_s + REST_S);
     let end = track_at + cycles(plan.duration_s);
+    let change = plan.gain_change;
+    let change = change.map(|change| (track_at + cycles(change.time_s).max(1), change));
 
     let active = active_joints(config);
     let plotted = [active[1], active[2]];
@@ -137,11 +153,17 @@ pub fn run<const N: usize>(
                 duration_s: move_s,
             }),
             _ if k == track_at => Some(Request::Track(plan.trajectory)),
-            _ => None,
+            _ => change
+                .filter(|(at, _)| k == *at)
+                .map(|(_, change)| Request::Gains {
+                    gains: change.gains,
+                    ramp_s: change.ramp_s,
+                }),
         };
         let cycle = rig.cycle(request);
         let output = &cycle.output;
-        if let Some(refusal) = output.refusal {
+        // The learner may send a request in the cycle of a fault.
+        if let (Some(refusal), None) = (output.refusal, output.fault) {
             return Err(ExperimentError::Refused {
                 experiment: plan.name.clone(),
                 reason: in_words(config, &refusal),

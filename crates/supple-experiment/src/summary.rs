@@ -1,10 +1,10 @@
 //! Numerical results of a demo, as in `summary.json`.
 
 use crate::adapted::Adapted;
+use crate::calibrated_runs::CalibratedRuns;
 use crate::metrics::LineFit;
 use crate::probing::Stroke;
 use crate::quadrant::SegmentPass;
-use crate::realistic::RealisticRuns;
 use crate::run::FaultEnd;
 use crate::trace::JointTorque;
 use serde::Serialize;
@@ -131,7 +131,13 @@ pub struct Summary {
     /// Sinusoid and arc on the realistic plant, or on that of `plant` if it has options, with a model calibrated on the
     /// same arm; absent if these runs were left out.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub realistic: Option<RealisticRuns>,
+    pub realistic: Option<CalibratedRuns>,
+    /// The same on the plant without options; absent if another plant or a model was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ideal: Option<CalibratedRuns>,
+    /// Reason why no model was identified on the arm; figures 5 and 6 then have the perturbed model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub not_identified: Option<String>,
     /// Figure 3a.
     pub sinusoid: TrackingError,
     /// Figure 3a at half, once and twice the paper's speed.
@@ -146,20 +152,20 @@ pub struct Summary {
     pub quadrant_perturbed: QuadrantSummary,
     /// Figure 3b at the paper's maximum speed, with the unperturbed model.
     pub quadrant_at_paper_speed: QuadrantSummary,
-    /// Figures 5 and 6, with the perturbed model.
+    /// Figures 5 and 6, with a model identified on the arm.
     pub probing: Vec<ProbingSummary>,
     /// Statistics over these runs.
     #[serde(flatten)]
     pub contact: ContactStatistics,
-    /// Probing with the friction feed-forward left on in contact.
+    /// Probing with the friction feed-forward left on in contact, perturbed model.
     pub probing_fade_off: Vec<ProbingSummary>,
     /// Statistics over these runs.
     pub fade_off: ContactStatistics,
     /// Probing at 5 and 125 N/m with the plant's own parameters in the model: without the model error.
     pub probing_exact_model: Vec<ProbingSummary>,
-    /// Probing at 5 and 125 N/m on a block with a sheet of rubber, perturbed model.
+    /// Probing at 5 and 125 N/m on a block with a sheet of rubber, identified model.
     pub probing_rubber: Vec<ProbingSummary>,
-    /// Probing at 5 and 125 N/m with an apparent inertia of 1 kg by the force sensor, (3.6) whole; perturbed model.
+    /// Probing at 5 and 125 N/m with an apparent inertia of 1 kg by the force sensor, (3.6) whole; identified model.
     pub probing_apparent_inertia: Vec<ProbingSummary>,
     /// Figure 3a with that apparent inertia, perturbed model.
     pub sinusoid_apparent_inertia: TrackingError,

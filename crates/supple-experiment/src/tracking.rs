@@ -41,6 +41,7 @@ pub fn track_with_identified_model<const N: usize>(
             trajectory,
             duration_s,
             learning: false,
+            gain_change: None,
         };
         run(&plan, &mut |_, _| Ok(())).map(|run| run.rms_error_m)
     };

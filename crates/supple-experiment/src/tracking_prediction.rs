@@ -75,6 +75,7 @@ pub fn predict_tracking_error<const N: usize>(
             trajectory,
             duration_s,
             learning: false,
+            gain_change: None,
         };
         match run(&plan, &mut |_, _| Ok(())) {
             Ok(run) => {

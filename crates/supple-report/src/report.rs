@@ -76,8 +76,11 @@ pub fn html(
         adapted: arm_notes(summary),
         parts: parts.collect(),
         stiffness_tables: [
-            stiffness_table("Friction feed-forward fades in contact", &summary.probing),
-            stiffness_table("Friction feed-forward stays on", &summary.probing_fade_off),
+            stiffness_table("A model identified on the arm", &summary.probing),
+            stiffness_table(
+                "Friction feed-forward left on, perturbed model",
+                &summary.probing_fade_off,
+            ),
             stiffness_table(
                 "The plant's own parameters in the model",
                 &summary.probing_exact_model,

@@ -4,7 +4,7 @@ use crate::units::{LEFT_OUT, figures, mm, newton_seconds, newtons, percent, plai
 use comfy_table::{ContentArrangement, Table, presets};
 use supple_experiment::metrics::median;
 use supple_experiment::summary::{ContactStatistics, ProbingSummary, Summary, TrackingError};
-use supple_experiment::{JointTorque, RealisticRuns};
+use supple_experiment::{CalibratedRuns, JointTorque, PressingForces};
 
 /// Formats the summary, one line per quantity.
 pub fn table(summary: &Summary) -> String {
@@ -81,14 +81,21 @@ fn free_motion(summary: &Summary) -> Vec<Line> {
     let (ideal, imperfect) = plants(summary);
     // A model given by the user is not perturbed in any run.
     let given_model = summary.model.is_some();
-    let realistic = summary
-        .realistic
-        .as_ref()
-        .map(|found| realistic(found, imperfect));
-    let mut lines = realistic.unwrap_or_default();
+    let runs = [(&summary.realistic, imperfect), (&summary.ideal, ideal)];
+    let runs = runs.into_iter().filter_map(|(found, plant)| {
+        let found = found.as_ref()?;
+        Some(calibrated(found, plant))
+    });
+    let mut lines: Vec<Line> = runs.flatten().collect();
     lines.extend([
         line(
-            &format!("{ideal}: sinusoid at 5 N/m, RMS error"),
+            &format!(
+                "{ideal}{}: sinusoid at 5 N/m, RMS error",
+                match given_model {
+                    true => "",
+                    false => ", perturbed model",
+                }
+            ),
             rms(&[&summary.sinusoid]),
             "follows closely (fig. 3a)",
         ),
@@ -192,8 +199,8 @@ pub(crate) fn plants(summary: &Summary) -> (&'static str, &'static str) {
     }
 }
 
-/// The plant with all effects of a real arm, first: the other rows leave these out.
-fn realistic(found: &RealisticRuns, imperfect: &str) -> Vec<Line> {
+/// Returns the rows of the controllers that were calibrated on their arm.
+fn calibrated(found: &CalibratedRuns, plant: &str) -> Vec<Line> {
     let median_and_worst =
         |errors: &[f64]| millimetres(&[median(errors).unwrap_or(f64::NAN), worst(errors)]);
     let mut faults = match found.ended.len() {
@@ -203,20 +210,22 @@ fn realistic(found: &RealisticRuns, imperfect: &str) -> Vec<Line> {
     if !found.failed.is_empty() {
         faults.push_str(&format!(", {} without result", found.failed.len()));
     }
-    vec![
-        line(
-            &format!("{imperfect}, calibrated and learning: sinusoid at 5 N/m; median, worst"),
-            format!("{}{faults}", median_and_worst(&found.sinusoid_rms_m)),
-            "follows closely (fig. 3a)",
-        ),
-        line(
+    let mut lines = vec![line(
+        &format!("{plant}, calibrated and learning: sinusoid at 5 N/m; median, worst"),
+        format!("{}{faults}", median_and_worst(&found.sinusoid_rms_m)),
+        "follows closely (fig. 3a)",
+    )];
+    if !found.warm_rms_m.is_empty() {
+        lines.push(line(
             "  after 20 min of warm-up",
             median_and_worst(&found.warm_rms_m),
             "",
-        ),
+        ));
+    }
+    lines.extend([
         line("  arc", median_and_worst(&found.arc_rms_m), ""),
         line(
-            "  sinusoid at 0.5 N/m",
+            "  sinusoid at 0.5 N/m, learned at 5 N/m",
             median_and_worst(&found.soft_rms_m),
             "",
         ),
@@ -230,7 +239,34 @@ fn realistic(found: &RealisticRuns, imperfect: &str) -> Vec<Line> {
             found.false_latches.to_string(),
             "",
         ),
-    ]
+    ]);
+    lines.extend(found.pressing.iter().map(|forces| {
+        line(
+            &format!(
+                "  pressing at {} N/m, force less that of the spring",
+                figures(forces.stiffness_n_per_m)
+            ),
+            pressing_excess(forces),
+            "",
+        )
+    }));
+    lines
+}
+
+/// Formats median and worst of the force while pressing less that of the spring, and the force of the spring.
+pub(crate) fn pressing_excess(forces: &PressingForces) -> String {
+    let excess: Vec<f64> = forces.excess_n().collect();
+    let worst_n = excess
+        .iter()
+        .copied()
+        .max_by(|a, b| a.abs().total_cmp(&b.abs()));
+    match (median(&excess), worst_n, median(&forces.spring_force_n)) {
+        (Some(median_n), Some(worst_n), Some(spring_n)) => {
+            let [median_n, worst_n, spring_n] = [median_n, worst_n, spring_n].map(|n| plain(n, 2));
+            format!("{median_n}, {worst_n} of {spring_n} N")
+        }
+        _ => LEFT_OUT.to_owned(),
+    }
 }
 
 fn contact(summary: &Summary) -> Vec<Line> {
@@ -321,13 +357,17 @@ fn contact(summary: &Summary) -> Vec<Line> {
             "contribution of the impact",
         ),
         line(
-            "impulse over K from 5 N/m, friction compensation faded in contact",
+            "impulse over K from 5 N/m, friction compensation adapted in contact",
             fit(&summary.contact),
             "linear (fig. 6)",
         ),
-        line("  kept in contact", fit(&summary.fade_off), ""),
         line(
-            "  first 50 ms, faded, median over all K",
+            "  kept in contact, perturbed model",
+            fit(&summary.fade_off),
+            "",
+        ),
+        line(
+            "  first 50 ms, adapted, median over all K",
             or_none(median(&first).map(newton_seconds)),
             "",
         ),

@@ -16,7 +16,7 @@ pub struct DemoArgs {
     #[command(flatten)]
     pub urdf: UrdfArgs,
     /// The controller's model of the arm, for example the output of `supple identify`: path of its TOML or folder.
-    /// Default: the plant's own parameters, with the perturbations that each experiment defines. Without options of
+    /// Default: the plant's own parameters, with the perturbations that each experiment defines, and for contact a model that is identified on the arm. Without options of
     /// the simulated arm, the arm of each of --realistic-seeds is calibrated and uses its own model instead of this one.
     #[arg(long, value_name = "PATH")]
     pub model: Option<PathBuf>,

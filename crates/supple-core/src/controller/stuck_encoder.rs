@@ -396,7 +396,7 @@ impl<const N: usize> StuckEncoders<N> {
         self.contact_cycles >= CONTACT_CYCLES
     }
 
-    /// Reports an encoder as stuck if it is unchanged while its reference travels further than `stuck_rad`, or further than a
+    /// Reports an encoder as stuck if it is unchanged while its reference moves away by more than `stuck_rad`, or by more than a
     /// fraction of it in modes with joint references (`joint_reference`).
     pub fn check_reference(
         &mut self,
@@ -414,17 +414,18 @@ impl<const N: usize> StuckEncoders<N> {
             if !self.unchanged[encoder] {
                 continue;
             }
-            self.travel_rad[encoder] += abs(reference_rad_per_s[encoder]) * elapsed_s;
+            self.travel_rad[encoder] += reference_rad_per_s[encoder] * elapsed_s;
+            let value_rad = abs(self.travel_rad[encoder]);
             let share = match joint_reference {
                 true if self.min_change_rad[encoder] < FINE_ENCODER_RAD => FINE_STUCK_SHARE,
                 true if self.all_unchanged() => ALL_STUCK_SHARE,
                 _ => 1.0,
             };
             let limit_rad = share * plausible.stuck_rad;
-            if self.travel_rad[encoder] > limit_rad {
+            if value_rad > limit_rad {
                 return Err(Fault::EncoderStuck {
                     joint: encoders.joint(encoder),
-                    value_rad: self.travel_rad[encoder],
+                    value_rad,
                     limit_rad,
                 });
             }

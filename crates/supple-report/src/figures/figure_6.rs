@@ -25,11 +25,11 @@ pub struct Series {
     pub fit: Option<LineFit>,
 }
 
-/// Impulses with the fade of the friction feed-forward on and off.
+/// Impulses with the friction feed-forward adapted in contact, and left on.
 pub struct Impulses {
-    /// Impulses with the fade on.
+    /// Impulses with an identified model, and the feed-forward adapted in contact.
     pub fade_on: Series,
-    /// Impulses with the fade off.
+    /// Impulses with a perturbed model, and the feed-forward left on.
     pub fade_off: Series,
 }
 
@@ -59,7 +59,7 @@ fn column(lines: &[ProbingSummary], value: fn(&ProbingSummary) -> f64) -> Vec<(f
 /// Draws the figure as SVG.
 pub fn draw(impulses: &Impulses) -> Result<String, FigureError> {
     let alt_text = "Impulse of one contact over stiffness with a straight line through it, friction \
-                 feed-forward faded in contact and left on";
+                 feed-forward adapted in contact and left on";
     draw_canvas((760, 400), alt_text, |area| {
         let (head, body) = area.split_vertically(px(46.0));
         keys(&head, impulses)?;
@@ -118,13 +118,13 @@ fn keys(area: &Area<'_>, impulses: &Impulses) -> Result<(), FigureError> {
         ),
         None => label.to_owned(),
     };
-    let on = formula("fade on", &impulses.fade_on);
-    let off = formula("fade off", &impulses.fade_off);
+    let on = formula("adapted", &impulses.fade_on);
+    let off = formula("left on", &impulses.fade_off);
     let rows = [
         [
             (on.as_str(), LegendSymbol::Mark(Mark::Dot), BLUE),
             (
-                "first impact, fade on",
+                "first impact, adapted",
                 LegendSymbol::Mark(Mark::Triangle),
                 GREEN,
             ),
@@ -217,7 +217,7 @@ mod tests {
             );
         }
         assert!(last.1 < first.1, "a larger value is higher in the figure");
-        assert!(svg.contains("fade on: 0.20 + 0.0200 K"));
+        assert!(svg.contains("adapted: 0.20 + 0.0200 K"));
     }
 
     #[test]
@@ -231,6 +231,6 @@ mod tests {
             fade_on: none(),
             fade_off: none(),
         });
-        assert!(svg.expect("a figure").contains("fade on"));
+        assert!(svg.expect("a figure").contains("adapted"));
     }
 }

@@ -127,6 +127,7 @@ fn first_run<const N: usize>(completed: &Completed) -> Result<Summary, Failure> 
         trajectory: setup.paths().sinusoid(1.0).0,
         duration_s: RUN_S,
         learning: false,
+        gain_change: None,
     };
     let found = simulate(&plan, &mut |_, _| Ok(()))?;
     let joints = &arm.settings().joints;

@@ -1,6 +1,7 @@
 //! Contact: figures 5 and 6, and the trade-off.
 
 use super::row::{Section, row};
+use crate::table::{plants, pressing_excess};
 use crate::units::{figures, mm, newton_seconds, newtons, percent, plain, seconds};
 use supple_experiment::metrics::{LineFit, median};
 use supple_experiment::summary::{ContactStatistics, ProbingSummary, Summary};
@@ -13,7 +14,7 @@ pub(super) fn force(summary: &Summary) -> Section {
         .map(|line| line.contact.peak_filtered_n)
         .collect();
     let fraction = |fraction: Option<f64>| fraction.map_or("none".to_owned(), percent);
-    let rows = vec![
+    let mut rows = vec![
         row(
             "first transient, median over K from 5 N/m",
             median(&from_five).map_or("none".to_owned(), newtons),
@@ -59,6 +60,18 @@ pub(super) fn force(summary: &Summary) -> Section {
             values(lines, &[5.0, 125.0], |e| seconds(e.contact.contact_s)),
         ),
     ];
+    let (_, imperfect) = plants(summary);
+    let pressing = summary.realistic.iter().flat_map(|found| &found.pressing);
+    rows.extend(pressing.map(|forces| {
+        let stiffness = figures(forces.stiffness_n_per_m);
+        row(
+            format!("{imperfect} at {stiffness} N/m: force while pressing less that of the spring; median, worst"),
+            pressing_excess(forces),
+        )
+    }));
+    if let Some(reason) = &summary.not_identified {
+        rows.push(row("no model was identified, it is perturbed", reason));
+    }
     Section {
         figure: "figure_5",
         title: "Force of an unexpected contact",
@@ -67,8 +80,9 @@ pub(super) fn force(summary: &Summary) -> Section {
                 collision itself and largely independent of a stiffness that differs by a factor of 25. \
                 What follows, in size and in duration, depends on the stiffness.",
         measured_here: "The vertical force of the sensor behind the tip, filtered in the same way, at 5 and 125 N/m, \
-               aligned at the first touch; the friction feed-forward fades in contact. The controller's model \
-               has the error of an identification; rows without it leave that error out. At the bottom of the stroke \
+               aligned at the first touch; in contact the friction feed-forward follows the measured motion. The controller's \
+               model was identified on the same arm; rows without model error have the arm's parameters, without the \
+               travel over which its friction reverses. At the bottom of the stroke \
                the reference rests for a second, which the paper's cycle does not have: the force while pressing \
                is the mean over its last half.",
         rows,
@@ -108,11 +122,11 @@ pub(super) fn impulse(summary: &Summary) -> Section {
                points from 5 N/m on. The impulse is curved: its slope grows with the stiffness towards that of the \
                spring, because a soft spring does not overcome the joints' friction. The intercept of a line is \
                therefore not the impact; the impact is measured by itself, from the first touch until the tip leaves \
-               the block, beside m v (1 + e) of the mass that the arm has at the tip. If it stays on, the friction \
+               the block, beside m v (1 + e) of the mass that the arm has at the tip. With a perturbed model, if it stays on, the friction \
                feed-forward keeps pushing with nearly the Coulomb torque when the block stops the tip.",
         rows: vec![
             row(
-                "impulse at 0.5, 1 and 2 N/m, fade on",
+                "impulse at 0.5, 1 and 2 N/m",
                 values(&summary.probing, &[0.5, 1.0, 2.0], |e| {
                     newton_seconds(e.contact.impulse_newton_s)
                 }),
@@ -133,10 +147,13 @@ pub(super) fn impulse(summary: &Summary) -> Section {
                 "slope from one stiffness to the next",
                 slopes(&summary.contact),
             ),
-            row("line from 5 N/m on, fade on", line(&summary.contact)),
-            row("line from 5 N/m on, fade off", line(&summary.fade_off)),
+            row("line from 5 N/m on", line(&summary.contact)),
             row(
-                "first 50 ms, median, fade on",
+                "line from 5 N/m on, friction left on, perturbed model",
+                line(&summary.fade_off),
+            ),
+            row(
+                "first 50 ms, median",
                 median(&first).map_or("none".to_owned(), newton_seconds),
             ),
         ],

@@ -3,9 +3,9 @@
 use super::row::{Row, Section, quadrants_with_models, row};
 use crate::table::{plants, worst};
 use crate::units::{mm, newton_metres, seconds};
-use supple_experiment::JointTorque;
 use supple_experiment::metrics::median;
 use supple_experiment::summary::{QuadrantSummary, Summary, TrackingError};
+use supple_experiment::{CalibratedRuns, JointTorque};
 
 /// Formats RMS and maximum error, and the reason if the run ended early.
 fn error(tracking: &TrackingError) -> String {
@@ -17,11 +17,15 @@ fn error(tracking: &TrackingError) -> String {
 }
 
 pub(super) fn sinusoid(summary: &Summary) -> Section {
-    let mut rows: Vec<Row> = realistic(summary);
+    let mut rows: Vec<Row> = calibrated(summary);
     let (ideal, _) = plants(summary);
     for at in &summary.sinusoid_by_speed {
         let quantity = format!(
-            "{ideal}: error at {} \u{d7} the speed: RMS, maximum",
+            "{ideal}{}: error at {} \u{d7} the speed: RMS, maximum",
+            match summary.model {
+                Some(_) => "",
+                None => ", perturbed model",
+            },
             at.speed
         );
         rows.push(row(quantity, error(&at.tracking)));
@@ -39,17 +43,24 @@ pub(super) fn sinusoid(summary: &Summary) -> Section {
                the periods. The controller's model is perturbed. The first rows are the headline: a plant with elastic \
                cables, ripple, friction that warms up and varies, errors of amplifiers, encoders, mounting and tool, \
                and a controller calibrated on that arm that learns for 24 s before the errors count. The figure and all other rows are of the ideal plant, \
-               which has none of these, unless plant options were given.",
+               which has none of these, unless plant options were given; the figure and the last rows have the perturbed \
+               model.",
         rows,
     }
 }
 
-/// Returns the rows of the realistic plant with a calibrated model.
-fn realistic(summary: &Summary) -> Vec<Row> {
-    let Some(found) = &summary.realistic else {
-        return Vec::new();
-    };
-    let (_, imperfect) = plants(summary);
+/// Returns the rows of the controllers that were calibrated on their arm, of the realistic plant first.
+fn calibrated(summary: &Summary) -> Vec<Row> {
+    let (ideal, imperfect) = plants(summary);
+    let runs = [(&summary.realistic, imperfect), (&summary.ideal, ideal)];
+    let runs = runs.into_iter().filter_map(|(found, plant)| {
+        let found = found.as_ref()?;
+        Some(calibrated_on(found, plant))
+    });
+    runs.flatten().collect()
+}
+
+fn calibrated_on(found: &CalibratedRuns, plant: &str) -> Vec<Row> {
     let errors = |errors: &[f64]| {
         format!(
             "{}, {}",
@@ -58,36 +69,41 @@ fn realistic(summary: &Summary) -> Vec<Row> {
         )
     };
     let of = format!(
-        "{imperfect}, calibrated and learning, {} seeds",
+        "{plant}, calibrated and learning, {} seeds",
         found.sinusoid_rms_m.len()
     );
-    let mut rows = vec![
-        row(
-            format!("{of}: RMS, median, worst"),
-            errors(&found.sinusoid_rms_m),
+    let named = [
+        (format!("{of}: RMS, median, worst"), &found.sinusoid_rms_m),
+        (
+            "the same after 20 min of warm-up".to_owned(),
+            &found.warm_rms_m,
         ),
-        row(
-            "the same after 20 min of warm-up",
-            errors(&found.warm_rms_m),
+        ("the same on the arc".to_owned(), &found.arc_rms_m),
+        (
+            "the sinusoid at 0.5 N/m after learning at 5 N/m".to_owned(),
+            &found.soft_rms_m,
         ),
-        row("the same on the arc", errors(&found.arc_rms_m)),
-        row("the sinusoid at 0.5 N/m", errors(&found.soft_rms_m)),
-        row(
-            "the same calibrated alone: cold",
-            errors(&found.calibrated_sinusoid_rms_m),
+        (
+            "the sinusoid, calibrated alone: cold".to_owned(),
+            &found.calibrated_sinusoid_rms_m,
         ),
-        row(
-            "calibrated alone: warm",
-            errors(&found.calibrated_warm_rms_m),
+        (
+            "calibrated alone: warm".to_owned(),
+            &found.calibrated_warm_rms_m,
         ),
-        row("calibrated alone: arc", errors(&found.calibrated_arc_rms_m)),
-        row(
-            "false reports of contact while learning",
-            found.false_latches.to_string(),
+        (
+            "calibrated alone: arc".to_owned(),
+            &found.calibrated_arc_rms_m,
         ),
     ];
+    let named = named.into_iter().filter(|(_, of)| !of.is_empty());
+    let mut rows: Vec<Row> = named.map(|(name, of)| row(name, errors(of))).collect();
+    rows.push(row(
+        "false reports of contact while learning",
+        found.false_latches.to_string(),
+    ));
     for failure in &found.failed {
-        let name = format!("{imperfect}, seed {}: no result", failure.seed);
+        let name = format!("{plant}, seed {}: no result", failure.seed);
         rows.push(row(name, failure.reason.clone()));
     }
     rows

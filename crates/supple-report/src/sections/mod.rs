@@ -53,8 +53,8 @@ pub fn faults(summary: &Summary) -> Vec<(String, &FaultEnd)> {
         runs.push((format!("sinusoid, exact model, {name}"), &tracking.ended));
     }
     for (kind, runs_by_stiffness) in [
-        ("fade on", &summary.probing),
-        ("fade off", &summary.probing_fade_off),
+        ("identified model", &summary.probing),
+        ("friction left on", &summary.probing_fade_off),
         ("exact model", &summary.probing_exact_model),
         ("rubber", &summary.probing_rubber),
         ("apparent inertia", &summary.probing_apparent_inertia),

@@ -6,7 +6,7 @@ use supple_core::Vector;
 use supple_core::config::{Collision, Config, Gains};
 use supple_core::controller::{Fault, Request, SafeAction};
 use supple_core::math::Vector3;
-use supple_core::trajectory::{Line, Trajectory};
+use supple_core::trajectory::{Line, Sinusoid, Trajectory};
 
 /// Joints for which only the check of motion is active: their friction holds any torque.
 fn of_motion() -> Config<4> {
@@ -133,6 +133,30 @@ fn all_encoders_stuck_at_once_fault_sooner() {
             "{value_rad} rad before the fault"
         );
     }
+}
+
+/// Dry friction may hold a joint whose reference only swings a little about its angle, however often; a reference that moves away
+/// shows that the encoder is stuck.
+#[test]
+fn a_reference_that_swings_about_a_resting_joint_is_no_stuck_encoder() {
+    let tracked = |amplitude_m: f64| {
+        let mut config = of_motion();
+        config.latch.threshold_n = 1e3;
+        let mut rig = Rig::holding(config, bent());
+        rig.accept(Request::Track(Trajectory::Sinusoid(Sinusoid {
+            centre_m: rig.tip(),
+            amplitude_m: Vector3::new(0.0, 0.0, amplitude_m),
+            angular_frequency_rad_per_s: 2.0,
+            ramp_s: 1.0,
+        })));
+        (0..20_000).find_map(|_| rig.cycle().fault)
+    };
+    assert_eq!(tracked(0.02), None);
+    let fault = tracked(0.1);
+    assert!(
+        matches!(fault, Some(Fault::EncoderStuck { .. })),
+        "{fault:?}"
+    );
 }
 
 /// A contact during which no encoder has changed is caused by stuck encoders and does not suspend the check. A contact during
