@@ -28,7 +28,7 @@ const REST_S: f64 = 0.5;
 const EXTRAPOLATED_M: f64 = 0.05;
 
 impl<const N: usize> State<N> {
-    /// Updates the direction of the dry friction for one cycle of the reference.
+    /// Updates the direction of the dry friction and the joint velocities of the reference for one cycle.
     #[inline(never)]
     pub(super) fn update_dry_direction(
         &mut self,
@@ -46,6 +46,7 @@ impl<const N: usize> State<N> {
             && !pose;
         let Some((task, reference)) = tracking.filter(|_| tracks) else {
             self.dry_direction = None;
+            self.velocity_at_reference_rad_per_s = None;
             return;
         };
         let mut directions = self.dry_direction.unwrap_or_else(Vector::zeros);
@@ -68,6 +69,7 @@ impl<const N: usize> State<N> {
             };
         }
         self.dry_direction = Some(directions);
+        self.velocity_at_reference_rad_per_s = Some(velocity);
     }
 }
 

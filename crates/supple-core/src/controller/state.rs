@@ -55,6 +55,8 @@ pub struct State<const N: usize> {
     pub(super) friction: [Friction; N],
     /// Direction of the dry friction to feed forward; `None`: the direction of the velocity.
     pub(super) dry_direction: Option<Vector<N>>,
+    /// Joint velocities of the reference for a tip at its reference, where presliding is known \[rad/s\].
+    pub(super) velocity_at_reference_rad_per_s: Option<Vector<N>>,
     /// Direction of the dry friction according to the measured motion.
     pub(super) measured_direction: MeasuredDirection<N>,
     pub(super) gains: GainRamp<Gains>,
@@ -112,6 +114,7 @@ impl<const N: usize> State<N> {
             contact_velocity_rad_per_s: Vector::zeros(),
             friction: config.friction,
             dry_direction: None,
+            velocity_at_reference_rad_per_s: None,
             measured_direction: MeasuredDirection::unknown(),
             gains: GainRamp::at_rest(config.law.gains),
             joint_gains: GainRamp::at_rest(config.joint_gains),

@@ -189,7 +189,8 @@ impl<const N: usize> State<N> {
             if self.latch.in_contact() && !was_in_contact {
                 self.contact_velocity_rad_per_s = velocity;
             }
-            reference_rad_per_s = velocity;
+            // Of the last cycle; at the measured pose, a joint that the reference does not move would seem to move.
+            reference_rad_per_s = self.velocity_at_reference_rad_per_s.unwrap_or(velocity);
         } else if self.is_resting(&reference_rad_per_s) && is_regular(task) {
             self.latch.observe_at_rest(&config.latch, &force, elapsed_s);
         }
