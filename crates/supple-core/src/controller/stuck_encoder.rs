@@ -32,6 +32,9 @@ const SUDDEN_STOP_S: f64 = 0.02;
 const SUDDEN_STOP_SPEED_SHARE: f64 = 0.2;
 /// Number of cycles with motion that make a contact plausible. Encoders that stick one after the other still have some.
 const CONTACT_CYCLES: u32 = 5;
+/// Limit of the torque that leaves an encoder unchanged in a contact during which it has changed, over the limit without contact. A
+/// rigid arm that presses on a rigid obstacle does not move either.
+const CONTACT_LIMIT: f64 = 2.0;
 /// Time for which the encoder of a joint in a collision may stay unchanged before it counts as stuck \[s\].
 const UNCHANGED_LIMIT_S: f64 = 0.03;
 /// The same time under a torque that dry friction does not hold \[s\]. A blow moves the joint by one count sooner.
@@ -85,6 +88,8 @@ pub(super) struct StuckEncoders<const N: usize> {
     last_velocity_rad_per_s: Vector<N>,
     /// Cycles of the present contact in which an encoder has changed, up to [`CONTACT_CYCLES`].
     contact_cycles: u32,
+    /// Cycles of the present contact in which the encoder has changed.
+    moved_cycles: [u32; N],
 }
 
 /// Effect of one resolution step of an encoder on the observed torque of its motor.
@@ -113,6 +118,7 @@ impl<const N: usize> Default for StuckEncoders<N> {
             ramp_nm: 0.0,
             last_velocity_rad_per_s: Vector::zeros(),
             contact_cycles: 0,
+            moved_cycles: [0; N],
         }
     }
 }
@@ -341,7 +347,10 @@ impl<const N: usize> StuckEncoders<N> {
             if self.unchanged_s[encoder] <= elapsed_s {
                 (self.external_nm[encoder], self.loaded_s[encoder]) = (torque_nm, 0.0);
             }
-            let limit_nm = stiction_limit_nm[encoder];
+            let mut limit_nm = stiction_limit_nm[encoder];
+            if self.moved_cycles[encoder] >= CONTACT_CYCLES {
+                limit_nm *= CONTACT_LIMIT;
+            }
             if abs(torque_nm) <= limit_nm {
                 self.loaded_s[encoder] = 0.0;
                 continue;
@@ -389,9 +398,16 @@ impl<const N: usize> StuckEncoders<N> {
     /// Returns whether the latched contact is plausible: encoders have changed in [`CONTACT_CYCLES`] of its cycles.
     pub fn is_contact_plausible(&mut self, in_contact: bool) -> bool {
         if !in_contact {
-            self.contact_cycles = 0;
-        } else if self.contact_cycles < CONTACT_CYCLES && !self.all_unchanged() {
-            self.contact_cycles += 1;
+            if self.contact_cycles > 0 {
+                (self.contact_cycles, self.moved_cycles) = (0, [0; N]);
+            }
+            return false;
+        }
+        if !self.all_unchanged() {
+            self.contact_cycles = self.contact_cycles.saturating_add(1);
+            for (cycles, unchanged) in self.moved_cycles.iter_mut().zip(&self.unchanged) {
+                *cycles = cycles.saturating_add(u32::from(!unchanged));
+            }
         }
         self.contact_cycles >= CONTACT_CYCLES
     }
