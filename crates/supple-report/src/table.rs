@@ -362,7 +362,10 @@ fn contact(summary: &Summary) -> Vec<Line> {
             "linear (fig. 6)",
         ),
         line(
-            "  kept in contact, perturbed model",
+            match summary.model {
+                Some(_) => "  kept in contact",
+                None => "  kept in contact, perturbed model",
+            },
             fit(&summary.fade_off),
             "",
         ),

@@ -60,7 +60,7 @@ fn a_demo_with_runs_that_a_fault_ended_exits_with_code_5_and_all_results() {
     let report = fs::read_to_string(out.join("report.html")).expect("the report");
     assert!(report.contains("Runs that a fault ended"));
     assert!(!report.contains(NAME) && report.contains("timid &#60;b&#62;&#38;"));
-    assert!(report.contains("probing at 5 N/m, fade on"));
+    assert!(report.contains("probing at 5 N/m, identified model"));
     for name in [
         "figure_3a",
         "figure_3b",
