@@ -88,8 +88,10 @@ pub(super) struct StuckEncoders<const N: usize> {
     last_velocity_rad_per_s: Vector<N>,
     /// Cycles of the present contact in which an encoder has changed, up to [`CONTACT_CYCLES`].
     contact_cycles: u32,
-    /// Cycles of the present contact in which the encoder has changed.
+    /// Cycles of the last contact in which the encoder has changed; zero once it has changed after that contact.
     moved_cycles: [u32; N],
+    /// Whether any of them is not zero.
+    has_moved: bool,
 }
 
 /// Effect of one resolution step of an encoder on the observed torque of its motor.
@@ -119,6 +121,7 @@ impl<const N: usize> Default for StuckEncoders<N> {
             last_velocity_rad_per_s: Vector::zeros(),
             contact_cycles: 0,
             moved_cycles: [0; N],
+            has_moved: false,
         }
     }
 }
@@ -395,16 +398,30 @@ impl<const N: usize> StuckEncoders<N> {
         }
     }
 
+    /// Resets the cycles of the last contact of encoders that have changed after it. The latch opens before the arm leaves the
+    /// obstacle: an encoder that has not changed since is still held.
+    #[cold]
+    fn forget_moved(&mut self) {
+        for (cycles, unchanged) in self.moved_cycles.iter_mut().zip(&self.unchanged) {
+            if !unchanged {
+                *cycles = 0;
+            }
+        }
+        self.has_moved = self.moved_cycles.iter().any(|cycles| *cycles > 0);
+    }
+
     /// Returns whether the latched contact is plausible: encoders have changed in [`CONTACT_CYCLES`] of its cycles.
     pub fn is_contact_plausible(&mut self, in_contact: bool) -> bool {
         if !in_contact {
-            if self.contact_cycles > 0 {
-                (self.contact_cycles, self.moved_cycles) = (0, [0; N]);
+            self.contact_cycles = 0;
+            if self.has_moved {
+                self.forget_moved();
             }
             return false;
         }
         if !self.all_unchanged() {
             self.contact_cycles = self.contact_cycles.saturating_add(1);
+            self.has_moved = true;
             for (cycles, unchanged) in self.moved_cycles.iter_mut().zip(&self.unchanged) {
                 *cycles = cycles.saturating_add(u32::from(!unchanged));
             }
