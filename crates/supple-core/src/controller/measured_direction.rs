@@ -47,7 +47,7 @@ impl<const N: usize> MeasuredDirection<N> {
 #[cfg(test)]
 mod tests {
     use super::MeasuredDirection;
-    use crate::math::Vector;
+    use crate::math::{Vector, exp};
     use crate::model::friction::Friction;
 
     const STEP_RAD: f64 = 5e-5;
@@ -88,7 +88,7 @@ mod tests {
             move_to(&mut measured, &friction, STEP_RAD * f64::from(100 - k));
         }
         // 40 steps back, less the play of two: from one step before the angle to one after it.
-        let expected = (1.0 + before) * f64::exp(-38.0 * STEP_RAD / 5e-4) - 1.0;
+        let expected = (1.0 + before) * exp(-38.0 * STEP_RAD / 5e-4) - 1.0;
         let direction = measured.of_joint(0);
         assert!(
             (direction - expected).abs() < 1e-9,

@@ -90,7 +90,7 @@ pub(super) struct StuckEncoders<const N: usize> {
     contact_cycles: u32,
     /// Cycles of the last contact in which the encoder has changed; zero once it has changed after that contact.
     moved_cycles: [u32; N],
-    /// Whether any of them is not zero.
+    /// Whether contact is latched, or any of them is not zero.
     has_moved: bool,
 }
 
@@ -398,34 +398,30 @@ impl<const N: usize> StuckEncoders<N> {
         }
     }
 
-    /// Resets the cycles of the last contact of encoders that have changed after it. The latch opens before the arm leaves the
-    /// obstacle: an encoder that has not changed since is still held.
-    #[cold]
-    fn forget_moved(&mut self) {
-        for (cycles, unchanged) in self.moved_cycles.iter_mut().zip(&self.unchanged) {
-            if !unchanged {
-                *cycles = 0;
-            }
-        }
-        self.has_moved = self.moved_cycles.iter().any(|cycles| *cycles > 0);
+    /// Returns whether the latched contact is plausible: encoders have changed in [`CONTACT_CYCLES`] of its cycles.
+    #[inline]
+    pub fn is_contact_plausible(&mut self, in_contact: bool) -> bool {
+        (in_contact || self.has_moved) && self.count_moved(in_contact)
     }
 
-    /// Returns whether the latched contact is plausible: encoders have changed in [`CONTACT_CYCLES`] of its cycles.
-    pub fn is_contact_plausible(&mut self, in_contact: bool) -> bool {
-        if !in_contact {
-            self.contact_cycles = 0;
-            if self.has_moved {
-                self.forget_moved();
-            }
-            return false;
-        }
-        if !self.all_unchanged() {
+    /// Counts the cycles of the contact in which encoders change. After the contact resets the count of an encoder that changes: the
+    /// latch opens before the arm leaves the obstacle, so that an encoder that has not changed since is still held.
+    #[cold]
+    #[inline(never)]
+    fn count_moved(&mut self, in_contact: bool) -> bool {
+        if in_contact && !self.all_unchanged() {
             self.contact_cycles = self.contact_cycles.saturating_add(1);
-            self.has_moved = true;
-            for (cycles, unchanged) in self.moved_cycles.iter_mut().zip(&self.unchanged) {
-                *cycles = cycles.saturating_add(u32::from(!unchanged));
-            }
+        } else if !in_contact {
+            self.contact_cycles = 0;
         }
+        for (cycles, unchanged) in self.moved_cycles.iter_mut().zip(&self.unchanged) {
+            *cycles = match (in_contact, unchanged) {
+                (_, true) => *cycles,
+                (true, false) => cycles.saturating_add(1),
+                (false, false) => 0,
+            };
+        }
+        self.has_moved = in_contact || self.moved_cycles.iter().any(|cycles| *cycles > 0);
         self.contact_cycles >= CONTACT_CYCLES
     }
 

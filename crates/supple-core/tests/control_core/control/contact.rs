@@ -303,7 +303,7 @@ fn in_contact_known_presliding_follows_the_measured_motion() {
     }
     for i in 1..3 {
         let back = -before[i].signum();
-        let reversed = back + (before[i] - back) * f64::exp(-2.0);
+        let reversed = back + (before[i] - back) * supple_core::math::exp(-2.0);
         let found = dry(&last)[i];
         assert!(
             (found - reversed).abs() < 0.1,
