@@ -45,7 +45,7 @@ pub struct CalibratedRuns {
     pub calibrated_warm_rms_m: Vec<f64>,
     /// Faults that ended runs early.
     pub ended: Vec<SeedFault>,
-    /// Seeds without a result, with the reason: a calibration or a start that failed.
+    /// Seeds without a result, with the reason: a calibration or a start that failed; or without probing at one stiffness.
     pub failed: Vec<SeedFailure>,
 }
 

@@ -244,7 +244,7 @@ fn calibrated(found: &CalibratedRuns, plant: &str) -> Vec<Line> {
         line(
             &format!(
                 "  pressing at {} N/m, force less that of the spring",
-                figures(forces.stiffness_n_per_m)
+                forces.stiffness_n_per_m
             ),
             pressing_excess(forces),
             "",

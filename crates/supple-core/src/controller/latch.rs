@@ -183,14 +183,12 @@ impl Latch {
         self.force_against_n = -input.force_n.dot(&self.direction);
         let reversing = self.since_reversal_s < config.reversal_s;
         let configured_n = config.threshold_n + input.friction_uncertainty_n;
-        let tip_m_per_s = input.tip_velocity_m_per_s.dot(&self.direction);
-        let follows = self.reference_m_per_s > MIN_SPEED_M_PER_S
-            && tip_m_per_s >= FOLLOWING_SHARE * self.reference_m_per_s;
-        let blocked = self.has_followed & !follows;
-        self.has_followed |= follows & !reversing;
         let factor = self.residual.factor() * if reversing { 2.0 } else { 1.0 };
         self.threshold_n = configured_n * factor;
         let pushed = self.force_against_n > self.threshold_n;
+        let tip_m_per_s = input.tip_velocity_m_per_s.dot(&self.direction);
+        let follows = self.reference_m_per_s > MIN_SPEED_M_PER_S
+            && tip_m_per_s >= FOLLOWING_SHARE * self.reference_m_per_s;
         self.since_release_s += elapsed_s;
         if self.in_contact {
             self.latched_s += elapsed_s;
@@ -206,7 +204,9 @@ impl Latch {
             self.in_contact = true;
             self.confirmed = !follows || self.since_release_s < AGAIN_S;
             (self.latched_s, self.following_s) = (0.0, 0.0);
-        } else if self.share >= 1.0 && !reversing && !blocked {
+        } else if self.share >= 1.0 && !reversing && (follows || !self.has_followed) {
+            // A tip that followed and then stopped may be blocked; the force is then no residual.
+            self.has_followed |= follows;
             self.residual
                 .add(self.force_against_n / configured_n, elapsed_s);
         }

@@ -34,7 +34,7 @@ const SUDDEN_STOP_SPEED_SHARE: f64 = 0.2;
 const CONTACT_CYCLES: u32 = 5;
 /// Limit of the torque that leaves an encoder unchanged in a contact during which it has changed, over the limit without contact. A
 /// rigid arm that presses on a rigid obstacle does not move either.
-const CONTACT_LIMIT: f64 = 2.0;
+const CONTACT_LIMIT_FACTOR: f64 = 2.0;
 /// Time for which the encoder of a joint in a collision may stay unchanged before it counts as stuck \[s\].
 const UNCHANGED_LIMIT_S: f64 = 0.03;
 /// The same time under a torque that dry friction does not hold \[s\]. A blow moves the joint by one count sooner.
@@ -86,7 +86,7 @@ pub(super) struct StuckEncoders<const N: usize> {
     ramp_nm: f64,
     /// Velocities of the joints in the last cycle \[rad/s\].
     last_velocity_rad_per_s: Vector<N>,
-    /// Cycles of the present contact in which an encoder has changed, up to [`CONTACT_CYCLES`].
+    /// Cycles of the present contact in which an encoder has changed.
     contact_cycles: u32,
     /// Cycles of the last contact in which the encoder has changed; zero once it has changed after that contact.
     moved_cycles: [u32; N],
@@ -155,6 +155,16 @@ impl<const N: usize> StuckEncoders<N> {
             let changes = encoders.of(joint).map(|of| self.min_change_rad[of]);
             changes.fold(0.0, f64::max).min(MAX_RESOLUTION_RAD)
         })
+    }
+
+    /// Returns `limit_nm`, or more if the encoder has changed in the last contact and rests since.
+    #[cold]
+    #[inline(never)]
+    fn limit_in_contact_nm(&self, encoder: usize, limit_nm: f64) -> f64 {
+        match self.moved_cycles[encoder] >= CONTACT_CYCLES {
+            true => CONTACT_LIMIT_FACTOR * limit_nm,
+            false => limit_nm,
+        }
     }
 
     /// Adds a cycle to `loaded_s` if the external torque, which exceeds the limit, has grown by more than the limit since the
@@ -350,10 +360,11 @@ impl<const N: usize> StuckEncoders<N> {
             if self.unchanged_s[encoder] <= elapsed_s {
                 (self.external_nm[encoder], self.loaded_s[encoder]) = (torque_nm, 0.0);
             }
-            let mut limit_nm = stiction_limit_nm[encoder];
-            if self.moved_cycles[encoder] >= CONTACT_CYCLES {
-                limit_nm *= CONTACT_LIMIT;
+            if abs(torque_nm) <= stiction_limit_nm[encoder] {
+                self.loaded_s[encoder] = 0.0;
+                continue;
             }
+            let limit_nm = self.limit_in_contact_nm(encoder, stiction_limit_nm[encoder]);
             if abs(torque_nm) <= limit_nm {
                 self.loaded_s[encoder] = 0.0;
                 continue;

@@ -189,8 +189,7 @@ impl<const N: usize> State<N> {
             if self.latch.in_contact() && !was_in_contact {
                 self.contact_velocity_rad_per_s = velocity;
             }
-            // Of the last cycle; at the measured pose, a joint that the reference does not move would seem to move.
-            reference_rad_per_s = self.velocity_at_reference_rad_per_s.unwrap_or(velocity);
+            reference_rad_per_s = velocity;
         } else if self.is_resting(&reference_rad_per_s) && is_regular(task) {
             self.latch.observe_at_rest(&config.latch, &force, elapsed_s);
         }
@@ -374,10 +373,12 @@ impl<const N: usize> State<N> {
             // contact counts only after encoders have changed during it.
             if !stuck.is_contact_plausible(self.latch.in_contact()) {
                 let joint_reference = self.activity.has_joint_reference();
+                // Of the last cycle; at the measured pose, a joint that the reference does not move would seem to move.
+                let at_reference = self.velocity_at_reference_rad_per_s.as_ref();
                 stuck.check_reference(
                     encoders,
                     &config.plausible,
-                    input.reference_rad_per_s,
+                    at_reference.unwrap_or(input.reference_rad_per_s),
                     joint_reference,
                     input.elapsed_s,
                 )?;

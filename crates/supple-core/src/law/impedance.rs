@@ -262,18 +262,18 @@ pub(super) fn add_law_terms<T: Target<D>, F: TermSink<N, D>, const N: usize, con
                 Some(of) => friction[i].torque_in_direction_nm(velocity, of[i], share),
                 None => friction[i].torque_with_dry_share_nm(velocity, share),
             };
-            match (&input.held_friction, input.dry_direction) {
-                (Some(held), Some(of)) if friction[i].presliding_rad > 0.0 => {
+            let Some(held) = &input.held_friction else {
+                return torque_nm;
+            };
+            match input.dry_direction {
+                Some(of) if friction[i].presliding_rad > 0.0 => {
                     held.in_direction_nm(&friction[i], i, velocity, of[i])
                 }
-                (Some(held), _) => {
-                    let dry_nm = match input.dry_direction {
-                        Some(of) => friction[i].dry_size_nm(velocity) * of[i],
-                        None => friction[i].dry_torque_nm(velocity),
-                    };
+                of => {
+                    let direction = of.map_or_else(|| friction[i].direction(velocity), |of| of[i]);
+                    let dry_nm = friction[i].dry_size_nm(velocity) * direction;
                     torque_nm + held.difference_nm(&friction[i], i, velocity, dry_nm, share)
                 }
-                (None, _) => torque_nm,
             }
         };
         sink.add(|t| &mut t.friction, Torque(Vector::from_fn(feed_forward)));

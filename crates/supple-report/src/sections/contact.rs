@@ -63,7 +63,7 @@ pub(super) fn force(summary: &Summary) -> Section {
     let (_, imperfect) = plants(summary);
     let pressing = summary.realistic.iter().flat_map(|found| &found.pressing);
     rows.extend(pressing.map(|forces| {
-        let stiffness = figures(forces.stiffness_n_per_m);
+        let stiffness = forces.stiffness_n_per_m;
         row(
             format!("{imperfect} at {stiffness} N/m: force while pressing less that of the spring; median, worst"),
             pressing_excess(forces),
