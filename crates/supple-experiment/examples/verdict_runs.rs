@@ -74,8 +74,7 @@ fn one<const N: usize>(
     };
     let found = calibrate::<N>(description, &calibration, &mut |_| {})?;
     let plant = plant_of::<N>(description, &calibration)?;
-    let tracking = track_with_identified_model(&found.description, &plant)?;
-    let tracking = tracking.ok_or("out of reach")?;
+    let tracking = track_with_identified_model(&found.description, &plant)??;
     let predicted = predict_tracking_error(&found.description, &found.fit, 2)?;
     let predicted = predicted.ok_or("out of reach")?;
     let mut text = format!(

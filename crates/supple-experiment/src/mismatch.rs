@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use supple_core::nalgebra::Vector3;
-use supple_core::{Arm, ArmError, Body, Config, Friction, Joint};
+use supple_core::{Arm, ArmError, Body, Config, Friction, Joint, Link};
 
 /// Relative parameter errors of a model. Masses, centres of mass, viscous and dry friction are multiplied by one plus or minus
 /// the fraction. The signs are random, drawn from `seed`; Coulomb and breakaway friction of a joint have the same sign. All other
@@ -66,8 +66,15 @@ impl Mismatch {
                 ..friction.with_dry_scaled(dry_friction_factor)
             }
         });
+        let changed = Arm::new(&joints, arm.joint_from_tip(), None, arm.gravity())?;
+        // `joints` are in joint frames; a fit that starts from this model gives its links in the frames of the description.
+        let links = core::array::from_fn(|i| Link {
+            link_from_joint: arm.link_from_joint(i),
+            ..changed.links()[i]
+        });
+        let (armature, tip) = (changed.armature(), changed.joint_from_tip());
         Ok(Config {
-            arm: Arm::new(&joints, arm.joint_from_tip(), None, arm.gravity())?,
+            arm: Arm::from_links(links, armature, tip, arm.gravity())?,
             friction,
             ..*exact
         })

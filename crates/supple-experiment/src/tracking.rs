@@ -1,5 +1,6 @@
 //! Evaluates an identified model: tracks the sinusoid on the plant with a tip stiffness of 5 N/m.
 
+use crate::effects::result_or_error;
 use crate::error::ExperimentError;
 use crate::run::{Plan, run};
 use crate::scenario;
@@ -16,15 +17,15 @@ pub struct IdentifiedModelTracking {
     pub stribeck_m: f64,
 }
 
-/// Tracks the sinusoid with a controller configured from `identified`; `None` if the arm cannot reach the sinusoid.
-/// If a fault ends a run early, the tracking error is measured before the fault.
+/// Tracks the sinusoid with a controller configured from `identified`. A sinusoid that the arm cannot reach or start is a result:
+/// the reason. If a fault ends a run early, the tracking error is measured before the fault.
 ///
 /// # Errors
 /// [`ExperimentError`].
 pub fn track_with_identified_model<const N: usize>(
     identified: &Description,
     plant: &PlantConfig<N>,
-) -> Result<Option<IdentifiedModelTracking>, ExperimentError> {
+) -> Result<Result<IdentifiedModelTracking, String>, ExperimentError> {
     let error_m = |stribeck: bool| {
         let mut config = identified.config::<N>()?;
         config.law.gains = scenario::gains_like(&config.law.gains, scenario::STIFFNESS_N_PER_M);
@@ -45,12 +46,14 @@ pub fn track_with_identified_model<const N: usize>(
         };
         run(&plan, &mut |_, _| Ok(())).map(|run| run.rms_error_m)
     };
-    let coulomb_m = match error_m(false) {
-        Err(ExperimentError::BeyondJointStop { .. }) => return Ok(None),
-        found => found?,
+    let both = || {
+        Ok(IdentifiedModelTracking {
+            coulomb_m: error_m(false)?,
+            stribeck_m: error_m(true)?,
+        })
     };
-    Ok(Some(IdentifiedModelTracking {
-        coulomb_m,
-        stribeck_m: error_m(true)?,
-    }))
+    match both() {
+        Err(error @ ExperimentError::BeyondJointStop { .. }) => Ok(Err(error.to_string())),
+        found => result_or_error(found),
+    }
 }

@@ -11,7 +11,9 @@
 //!
 //! The solver applies Newton's method to `objective - mu (sum log det P_k + sum log g_i . x)`, with `mu` reduced in
 //! steps. At the minimum for one `mu` (a point of the central path), the objective is within `mu nu` of its own minimum, where
-//! `nu` is four for each link plus one for each `g_i`. The solver returns this bound with the result.
+//! `nu` is four for each link plus one for each `g_i`. The solver returns this bound with the result. While `mu` exceeds `gamma`,
+//! it takes the place of `gamma`: such a barrier against a weaker prior would move what the data leave undetermined far from `P0`,
+//! up to `mu / gamma` times as heavy.
 
 use crate::error::{IdentError, positive};
 use crate::qr_reduction::ReducedSystem;
@@ -176,14 +178,19 @@ impl<'a> Problem<'a> {
         form.iter().map(|(i, c)| c * x[*i]).sum()
     }
 
+    /// Returns the weight of the prior on the way to `mu = 0`.
+    fn gamma(&self, mu: f64) -> f64 {
+        self.constraints.prior_weight.max(mu)
+    }
+
     /// Returns the objective without the barrier; `None` outside the constraints.
     fn objective(&self, x: &DVector<f64>) -> Option<f64> {
         self.value(x, 0.0)
     }
 
-    /// Returns the objective with the barrier of weight `mu`; `None` outside the constraints.
+    /// Returns the objective with the barrier of weight `mu` and the prior of [`Problem::gamma`]; `None` outside the constraints.
     fn value(&self, x: &DVector<f64>, mu: f64) -> Option<f64> {
-        let gamma = self.constraints.prior_weight;
+        let gamma = self.gamma(mu);
         let mut value = 0.5 * (&self.a * x - &self.b).norm_squared();
         for (k, inverse) in self.prior_inverse.iter().enumerate() {
             let cholesky = self.link(x, k)?;
@@ -202,7 +209,7 @@ impl<'a> Problem<'a> {
 
     /// Returns the gradient and Hessian of [`Problem::value`].
     fn derivatives(&self, x: &DVector<f64>, mu: f64) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let gamma = self.constraints.prior_weight;
+        let gamma = self.gamma(mu);
         let mut gradient = self.a.tr_mul(&(&self.a * x - &self.b));
         let mut hessian = self.gram.clone();
         for (k, prior) in self.prior_inverse.iter().enumerate() {

@@ -59,9 +59,11 @@ impl Description {
         model: &IdentifiedModel<'_, N>,
     ) -> Result<Description, ModelError> {
         self.expect_dof(N)?;
+        // Joint frames are those of the kinematics; how links are placed in them is the description's own choice.
+        let own = self.config::<N>()?.arm;
         let bodies: [Body; N] = core::array::from_fn(|i| {
             model.arm.body(i).expressed_in(&Pose {
-                rotation: model.arm.link_from_joint(i),
+                rotation: own.link_from_joint(i),
                 ..Pose::IDENTITY
             })
         });

@@ -161,6 +161,31 @@ fn without_data_the_solution_is_the_prior() {
     }
 }
 
+/// The prior is far from satisfying the equations of an arm with little noise, and the mass of the second link is only known
+/// together with the first moment of the first, whose mass and inertia nothing determines.
+#[test]
+fn links_that_equations_leave_undetermined_stay_near_the_prior() {
+    let mut noise = Random::new(8);
+    let mut a = DMatrix::from_fn(400, 20, |_, _| 1e6 * noise.signed());
+    for undetermined in [0, 4, 5, 6, 7, 8, 9] {
+        a.column_mut(undetermined).fill(0.0);
+    }
+    let together = a.column(1).into_owned();
+    a.set_column(10, &together);
+    let truth = DVector::from_iterator(20, ball().iter().chain(&(ball() * 1.5)).copied());
+    let b = &a * &truth;
+    let constraints = Constraints {
+        links: vec![ball(), ball()],
+        not_negative: vec![],
+        prior_weight: 1e-3,
+        tolerance: 1e-9,
+    };
+    let found = solve(&block(a, b), &constraints).unwrap();
+    let determined = found.x[1] + found.x[10] - truth[1] - truth[10];
+    assert!(determined.abs() < 1e-6, "{}", found.x);
+    assert!(found.x.amax() < 10.0, "{}", found.x);
+}
+
 /// One unknown, solved by hand: a mass whose unconstrained estimate is negative stays positive, friction ends
 /// at its bound.
 #[test]

@@ -35,10 +35,13 @@ struct Summary {
     /// Motor, harmonic, amplitude at the motor \[N m\].
     ripple: Vec<(usize, u32, f64)>,
     truth: ModelAccuracy,
-    /// Tracking of the sinusoid with this model; `None` if the arm cannot reach it.
+    /// Tracking of the sinusoid with this model; `None` if the arm cannot do it.
     tracking: Option<IdentifiedModelTracking>,
     /// Tracking of the sinusoid, with calibration and plant without direction- and load-dependent friction.
     tracking_without_load: Option<IdentifiedModelTracking>,
+    /// Why the sinusoid could not be tracked.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    not_tracked: Vec<String>,
 }
 
 /// Runs `supple calibrate`.
@@ -112,7 +115,10 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Resu
             &plant_of::<N>(arm, calibration)?,
         )?)
     };
+    let mut not_tracked = Vec::new();
+    let mut failed = |reason: String| not_tracked.push(reason);
     let followed = follow(&calibration, &found.description)?;
+    let followed = followed.map_err(&mut failed).ok();
     let mut without_load = None;
     if !args.no_load_friction {
         if !args.quiet {
@@ -125,7 +131,8 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Resu
             ..calibration.clone()
         };
         let found = calibrate::<N>(arm, &other, &mut |_| {})?;
-        without_load = follow(&other, &found.description)?;
+        let followed = follow(&other, &found.description)?;
+        without_load = followed.map_err(&mut failed).ok();
     }
     let predicted_tracking = predict_tracking_error(&found.description, &found.fit, DRAWS)?;
     let report = ReportInput {
@@ -175,6 +182,7 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Resu
         truth: found.truth.clone(),
         tracking: followed,
         tracking_without_load: without_load,
+        not_tracked,
     };
     let text = json(&numbers)?;
     staging.write("calibration.json", format!("{text}\n").as_bytes())?;
@@ -215,6 +223,9 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Resu
             "without direction- and load-dependent friction: {}; the difference is due to that friction",
             both(tracking)
         ))?;
+    }
+    for reason in &numbers.not_tracked {
+        print_line(&format!("sinusoid at 5 N/m not tracked: {reason}"))?;
     }
     print_line(
         "this is a simulation: fits of real arms of this kind leave a residual of 6.7 to 8.4 % of the torque",
