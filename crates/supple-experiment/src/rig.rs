@@ -102,6 +102,14 @@ impl<const N: usize> Rig<N> {
         &self.plant
     }
 
+    /// Puts the arm at rest in this pose, as a support does.
+    ///
+    /// # Errors
+    /// If the pose is not finite, or has the tip inside an object.
+    pub fn place(&mut self, position_rad: Vector<N>) -> Result<(), ExperimentError> {
+        Ok(self.plant.set_state(position_rad, Vector::zeros())?)
+    }
+
     /// Runs one cycle: measures, steps the controller, actuates. The controller applies learned parameters in a cycle without a
     /// request.
     pub fn cycle(&mut self, request: Option<Request<N>>) -> Cycle<'_, N> {

@@ -186,6 +186,7 @@ fn effect_prior(column: &Column) -> Option<(f64, f64)> {
         Column::MotorCoulomb(_) | Column::MotorViscous(_) => Some((0.0, 0.5)),
         Column::Tilt(_) => Some((0.0, 0.005)),
         Column::TorqueScale(_) => Some((0.0, 0.03)),
+        Column::Load(_) => Some((0.0, 0.1)),
         _ => None,
     }
 }

@@ -47,6 +47,8 @@ pub struct MinimumThresholds {
     pub load_n: f64,
     /// `plausible.against_share`: torque that may oppose the acceleration of a joint, as a fraction of its torque limit.
     pub against_share: f64,
+    /// `limits.joint_tracking_error_rad`: deviation of a joint from its reference \[rad\].
+    pub joint_tracking_error_rad: f64,
 }
 
 impl Description {
@@ -169,6 +171,13 @@ impl Description {
                 "plausible",
                 "against_share",
                 minimum.against_share.max(settings.plausible.against_share),
+            ),
+            (
+                "limits",
+                "joint_tracking_error_rad",
+                minimum
+                    .joint_tracking_error_rad
+                    .max(settings.limits.joint_tracking_error_rad),
             ),
         ] {
             let section = document.entry(key).or_insert_with(toml_edit::table);

@@ -143,9 +143,17 @@ fn every_joint_moves(log: &Log) -> bool {
     columns.all(|q| q.max() - q.min() > MIN_RANGE_RAD)
 }
 
-/// Fits a model to `others` and to the excitation without its end, which validates the fit. `None` if the fit predicts the
-/// torques of that end no better than `model`, or if no controller starts with the fit: after so little motion the identified
-/// rotor inertias may be zero, and any damping would then make the joint unstable.
+/// Result of the first fit.
+pub enum FirstFit {
+    /// The model of the fit.
+    Better(Box<Description>, FitQuality),
+    /// The model before the fit stays, for this reason.
+    Rejected(String),
+}
+
+/// Fits a model to `others` and to the excitation without its end, which validates the fit. The fit is rejected if it predicts the
+/// torques of that end no better than `model`, or if no controller starts with it even with less damping: after so little motion
+/// the identified rotor inertias may be zero, and any damping would then make the joint unstable.
 ///
 /// # Errors
 /// A log that cannot be used.
@@ -153,7 +161,7 @@ pub fn fit_first<const N: usize>(
     model: &Description,
     excitation: &Log,
     others: &[Log],
-) -> Result<Option<(Description, FitQuality)>, ProcedureError> {
+) -> Result<FirstFit, ProcedureError> {
     let config = model.config::<N>()?;
     let rows = excitation.t_s.len();
     let cut = ((1.0 - HELD_OUT_FRACTION) * rows as f64) as usize;
@@ -167,10 +175,18 @@ pub fn fit_first<const N: usize>(
     let quality = quality(&config, &fit, &prepared(&held_out, &fit)?)?;
     let is_better = quality.validation_relative < quality.validation_relative_before;
     if !is_better {
-        return Ok(None);
+        return Ok(FirstFit::Rejected(format!(
+            "it leaves {:.1} % of the torque at the end of the pass unexplained, the model before it {:.1} %",
+            100.0 * quality.validation_relative,
+            100.0 * quality.validation_relative_before
+        )));
     }
-    let found = fit.description(model, None)?;
-    Ok(found.completed().is_ok().then_some((found, quality)))
+    let found = fit.description(model, None)?.with_stable_damping::<N>();
+    let found = found.and_then(|(found, _)| found.completed().map(|_| found));
+    Ok(match found {
+        Ok(found) => FirstFit::Better(Box::new(found), quality),
+        Err(error) => FirstFit::Rejected(format!("no controller starts with it: {error}")),
+    })
 }
 
 /// Fits a model to `logs` (excitations and slow motions) and the torque ripple to `constant_speed`, and validates both on the
@@ -237,6 +253,7 @@ fn raise_thresholds<const N: usize>(
         hold_pose: false,
         load_n: 0.0,
         against_share: AGAINST_TO_DRY_FRICTION * dry.max(),
+        joint_tracking_error_rad: 0.0,
     };
     Ok(model.with_minimum_thresholds(&minimum)?)
 }

@@ -82,13 +82,30 @@ impl<const N: usize> InProcessArm<N> {
         Ok(fault.map(|fault| in_words(config, &fault)))
     }
 
+    /// Leaves the drives idle for a time, from the cycle of this request if there is one. An arm without brakes would fall: it is
+    /// supported in its pose.
+    fn idle(&mut self, request: Option<Request<N>>, duration_s: f64) -> Result<(), ProcedureError> {
+        let supported = self.is_without_brakes();
+        let rig = self.rig()?;
+        let pose_rad = rig.plant().truth().position_rad;
+        for k in 0..cycles(duration_s, rig.controller().config().period_s) {
+            let _ = rig.cycle(request.filter(|_| k == 0));
+            if supported {
+                rig.place(pose_rad)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn is_without_brakes(&self) -> bool {
+        self.model
+            .as_ref()
+            .is_some_and(Description::falls_without_torque)
+    }
+
     /// Holds the arm at rest: in gravity hold, or by position loops if it has no brakes.
     fn settle(&mut self, motion: &str, remedy: &'static str) -> Result<(), ProcedureError> {
-        let without_brakes = self
-            .model
-            .as_ref()
-            .is_some_and(Description::falls_without_torque);
-        let fault = if without_brakes {
+        let fault = if self.is_without_brakes() {
             let period_s = self.rig()?.controller().config().period_s;
             self.hold(Request::GravityHold, period_s)?;
             let target_rad = self.position_rad()?;
@@ -216,7 +233,7 @@ impl<const N: usize> MotionArm<N> for InProcessArm<N> {
             }
         }
         self.model = Some(model.clone());
-        self.hold(Request::Idle, IDLE_S)?;
+        self.idle(Some(Request::Idle), IDLE_S)?;
         self.settle("holding still", super::HOLD_REMEDY)
     }
 
@@ -235,12 +252,8 @@ impl<const N: usize> MotionArm<N> for InProcessArm<N> {
     }
 
     fn recover(&mut self) -> Result<(), ProcedureError> {
-        let rig = self.rig()?;
-        let rest = cycles(REST_S, rig.controller().config().period_s);
-        for _ in 0..rest {
-            let _ = rig.cycle(None);
-        }
-        self.hold(Request::Reset, IDLE_S)?;
+        self.idle(None, REST_S)?;
+        self.idle(Some(Request::Reset), IDLE_S)?;
         self.settle(
             "holding still after a fault",
             "free the arm and clear the fault",

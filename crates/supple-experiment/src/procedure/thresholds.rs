@@ -5,6 +5,8 @@
 
 use super::error::ProcedureError;
 use super::motions::RAMP_LIMIT_NM;
+use crate::breakaway::JointBreakaway;
+use supple_core::config::JointGains;
 use supple_core::dynamics::gravity;
 use supple_core::{Config, Vector};
 use supple_model::{Description, MinimumThresholds};
@@ -26,6 +28,8 @@ const MAX_LIMIT_FRACTION: f64 = 0.9;
 /// differ from motor to motor.
 const FIRST_FIT_MOVE_SHARE: f64 = 2.0;
 const FIRST_FIT_AGAINST_SHARE: f64 = 0.35;
+/// Maximum of `limits.joint_tracking_error_rad` that friction may make necessary \[rad\].
+const MAX_TRACKING_ERROR_RAD: f64 = 0.5;
 /// Number of angles per joint of the grid of poses at which gravity is evaluated.
 const ANGLES_PER_JOINT: usize = 5;
 
@@ -46,6 +50,7 @@ pub fn minimum_thresholds<const N: usize>(
         load_n: LOAD_N,
         // Not raised for an arm with brakes: motion against the torque reveals a motor of the wrong sign.
         against_share: 0.0,
+        joint_tracking_error_rad: 0.0,
     };
     match (has_no_brakes, before_first_fit) {
         (false, _) => return Ok(minimum),
@@ -77,6 +82,18 @@ pub fn minimum_thresholds<const N: usize>(
         against_share: shares.max(),
         ..minimum
     })
+}
+
+/// Returns the error of position loops with these gains that friction causes, if its feed-forward has the wrong sign \[rad\]: the
+/// largest of all joints, at most 0.5 rad.
+pub fn friction_error_rad<const N: usize>(
+    gains: &JointGains<N>,
+    breakaway: &[JointBreakaway],
+) -> f64 {
+    let joints = breakaway.iter().zip(gains.stiffness_nm_per_rad.iter());
+    let errors =
+        joints.map(|(found, stiffness)| FRICTION_ERROR_RATIO * found.breakaway_nm() / stiffness);
+    errors.fold(0.0, f64::max).min(MAX_TRACKING_ERROR_RAD)
 }
 
 /// Returns the maximum gravity torque of each joint over a grid of poses within the joint limits \[N m\].

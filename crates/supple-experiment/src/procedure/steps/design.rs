@@ -67,7 +67,11 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             .model(ModelStage::Start)?
             .config::<N>()
             .map_err(ProcedureError::from)?;
-        self.first_gains = Some(gains_along(&given, &motions.all()).map_err(ProcedureError::from)?);
+        let mut gains = gains_along(&given, &motions.all()).map_err(ProcedureError::from)?;
+        let own = gains_along(&config, &motions.all()).map_err(ProcedureError::from)?;
+        gains.stiffness_nm_per_rad = gains.stiffness_nm_per_rad.inf(&own.stiffness_nm_per_rad);
+        gains.damping_nm_s_per_rad = gains.damping_nm_s_per_rad.inf(&own.damping_nm_s_per_rad);
+        self.first_gains = Some(gains);
         Ok(motions)
     }
 

@@ -3,6 +3,7 @@
 use super::{ModelStage, Run};
 use crate::procedure::arm::MotionArm;
 use crate::procedure::error::ProcedureError;
+use crate::procedure::fitting::FirstFit;
 use crate::procedure::progress::{FitQuality, StepName};
 use crate::procedure::{FIRST_MODEL, LOGS, fitting};
 use std::path::PathBuf;
@@ -38,17 +39,21 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             fitting::fit_first::<N>(&of, &pass, &others)
         })??;
         let (found, quality) = match fit {
-            Some((found, quality)) => (found, Some(quality)),
-            None => (scaled, None),
+            FirstFit::Better(found, quality) => {
+                self.report(&format!(
+                    "end of the first pass, which was not fitted: {:.1} % of the torque unexplained, {:.1} % before",
+                    100.0 * quality.validation_relative,
+                    100.0 * quality.validation_relative_before
+                ));
+                (*found, Some(quality))
+            }
+            FirstFit::Rejected(reason) => {
+                self.report(&format!(
+                    "the first fit is not used, the model before it stays: {reason}"
+                ));
+                (scaled, None)
+            }
         };
-        match &quality {
-            Some(quality) => self.report(&format!(
-                "end of the first pass, which was not fitted: {:.1} % of the torque unexplained, {:.1} % before",
-                100.0 * quality.validation_relative,
-                100.0 * quality.validation_relative_before
-            )),
-            None => self.report("the first fit is no better than the model before it, or no controller starts with it: that model stays"),
-        }
         let folder = self.options.out.join(FIRST_MODEL);
         found.save(&folder).map_err(ProcedureError::from)?;
         self.progress.first_fit = quality;

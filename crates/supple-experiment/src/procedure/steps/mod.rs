@@ -10,7 +10,7 @@ use crate::excite::move_to;
 use crate::procedure::arm::{Motion, MotionArm, StopCause};
 use crate::procedure::error::ProcedureError;
 use crate::procedure::progress::{FinishedStep, Progress, StepName};
-use crate::procedure::thresholds::minimum_thresholds;
+use crate::procedure::thresholds::{friction_error_rad, minimum_thresholds};
 use crate::procedure::{FIRST_MODEL, Operator, ProcedureOptions};
 use crate::request_sequence::Step;
 use std::path::PathBuf;
@@ -216,7 +216,11 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         let mut model = self.model(stage)?;
         if stage != ModelStage::Identified {
             let unknown = stage == ModelStage::Start || self.progress.first_fit.is_none();
-            let minimum = minimum_thresholds::<N>(&model, unknown)?;
+            let mut minimum = minimum_thresholds::<N>(&model, unknown)?;
+            if let (ModelStage::First, Some(gains)) = (stage, &self.first_gains) {
+                minimum.joint_tracking_error_rad =
+                    friction_error_rad(gains, &self.progress.breakaway);
+            }
             model = model
                 .with_minimum_thresholds(&minimum)
                 .map_err(ProcedureError::from)?;
