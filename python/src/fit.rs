@@ -13,6 +13,7 @@ use std::sync::Arc;
 use supple_core::ripple::{Harmonic, LINES};
 use supple_core::{Body, Matrix, RippleTable, Vector};
 use supple_ident::payload::{payload, torque_scale};
+use supple_ident::weigh::{Weighing, weigh};
 use supple_ident::{
     DMatrix, IdentError, Motion, Preparation, Procedure, RippleSearch, SaveError, Validation,
     Warning, fit_ripple, fit_with_stribeck, identify_motions,
@@ -21,6 +22,7 @@ use supple_model::{Description, ModelError, with_dof};
 
 /// A fit with any number of joints.
 pub trait Model: Send + Sync {
+    fn identified_joints(&self) -> &[usize];
     fn payload(&self, motions: &[Motion], guess: &Body) -> Result<Body, IdentError>;
     fn torque_scale(
         &self,
@@ -28,6 +30,12 @@ pub trait Model: Send + Sync {
         with: &[Motion],
         known: &Body,
     ) -> Result<Vec<Option<f64>>, IdentError>;
+    fn weigh(
+        &self,
+        without: &[Motion],
+        with: &[Motion],
+        mass_kg: f64,
+    ) -> Result<Weighing, IdentError>;
     fn ripple(
         &self,
         of: &Description,
@@ -93,6 +101,10 @@ pub struct Report {
 }
 
 impl<const N: usize> Model for supple_ident::Fit<N> {
+    fn identified_joints(&self) -> &[usize] {
+        self.columns.identified_joints()
+    }
+
     fn payload(&self, motions: &[Motion], guess: &Body) -> Result<Body, IdentError> {
         payload(self, motions, guess)
     }
@@ -104,6 +116,15 @@ impl<const N: usize> Model for supple_ident::Fit<N> {
         known: &Body,
     ) -> Result<Vec<Option<f64>>, IdentError> {
         torque_scale(self, without, with, known)
+    }
+
+    fn weigh(
+        &self,
+        without: &[Motion],
+        with: &[Motion],
+        mass_kg: f64,
+    ) -> Result<Weighing, IdentError> {
+        weigh(self, without, with, mass_kg)
     }
 
     fn ripple(

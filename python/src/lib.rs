@@ -50,7 +50,7 @@ mod _native {
     #[pymodule_export]
     use super::live::Connection;
     #[pymodule_export]
-    use super::load::{payload, ripple, torque_scale};
+    use super::load::{payload, ripple, torque_scale, weigh};
     #[pymodule_export]
     use super::log::read_log;
     #[pymodule_export]

@@ -1,4 +1,4 @@
-//! Further results of a fit: payload, torque scale and torque ripple.
+//! Further results of a fit: payload, torque scale, weighing and torque ripple.
 
 use crate::arrays;
 use crate::errors;
@@ -74,6 +74,35 @@ pub fn torque_scale(
     let known = Body::from(known);
     let found = py.detach(|| fit.model().torque_scale(fit.fitted(), &motions, &known));
     found.map_err(errors::identification)
+}
+
+/// Estimates torque scales and the place of a weight of known mass.
+#[pyfunction]
+pub fn weigh<'py>(
+    py: Python<'py>,
+    fit: &Fit,
+    logs: Vec<LogInput<'py>>,
+    mass_kg: f64,
+) -> PyResult<Bound<'py, PyDict>> {
+    let motions = motions(fit, &logs)?;
+    let found = py.detach(|| fit.model().weigh(fit.fitted(), &motions, mass_kg));
+    let found = found.map_err(errors::identification)?;
+    let dict = PyDict::new(py);
+    let joints = fit.model().identified_joints().iter();
+    let names: Vec<String> = joints
+        .map(|joint| fit.description().joint_names()[*joint].clone())
+        .collect();
+    dict.set_item("warnings", found.warnings(&names))?;
+    dict.set_item("torque_scale", found.torque_scale)?;
+    dict.set_item("torque_scale_deviation", found.torque_scale_deviation)?;
+    for (name, vector) in [
+        ("com_m", found.com_m),
+        ("com_deviation_m", found.com_deviation_m),
+    ] {
+        let values = vector.as_slice().to_vec();
+        dict.set_item(name, arrays::array(py, values, &[3])?)?;
+    }
+    Ok(dict)
 }
 
 /// Returns harmonic, sine and cosine amplitude of every line of each motor.

@@ -60,6 +60,28 @@ def test_a_known_payload_gives_the_torque_scale_of_each_joint(arm):
         fit.torque_scale(t, q, tau, qd, qdd, known=nothing)
 
 
+def test_a_known_mass_alone_gives_torque_scales_and_its_place(arm):
+    scale = np.array([0.8, 1.1, 0.9, 1.25])
+    noise = np.random.default_rng(4)
+
+    def logged(tau):
+        return tau / scale + noise.normal(scale=0.01, size=tau.shape)
+
+    t, q, qd, qdd = motion(4, 32)
+    fit = supple.identify(arm, t, q, logged(torques(arm, q, qd, qdd)), qd, qdd, method="wls", friction="coulomb")
+    t, q, qd, qdd = motion(4, 33)
+    tau = logged(torques(arm, q, qd, qdd) + loaded(arm, BALL)(q, qd, qdd))
+    found = fit.weigh(t, q, tau, qd, qdd, mass_kg=BALL.mass_kg)
+    assert found.torque_scale == pytest.approx(tuple(scale), rel=0.02)
+    np.testing.assert_allclose(found.com_m, BALL.com_m, atol=5e-3)
+    assert max(found.torque_scale_deviation) < 0.05 and found.com_deviation_m.max() < 0.01
+    assert found.warnings == () and "torque scales 0.8" in repr(found)
+    with pytest.raises(ValueError, match="mass_kg"):
+        fit.weigh(t, q, tau, qd, qdd, mass_kg=-1.0)
+    with pytest.raises(TypeError, match="mass_kg"):
+        fit.weigh(t, q, tau, qd, qdd, mass_kg="2 kg")
+
+
 def test_changed_friction_is_learnt_and_the_rest_is_unchanged(arm):
     t, q, qd, qdd = motion(4, 34)
     still = [0, 2]

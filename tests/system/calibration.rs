@@ -122,6 +122,50 @@ fn the_error_of_a_reversed_motor_names_the_joint() {
     }
 }
 
+/// Motors that give a quarter less torque than commanded, cables, a start that is 15 % off in gravity, 50 % in friction and 100 % in
+/// rotor inertia; the arm has no brakes and is supported while its drives are idle.
+#[test]
+fn a_yam_in_this_process_gets_to_a_better_model() {
+    let folder = temporary_folder();
+    let arguments = [
+        &[
+            "calibrate",
+            "--plant",
+            "in-process",
+            "--arm",
+            "yam",
+            "--yes",
+        ][..],
+        &[
+            "--plant-options",
+            "openarm-realistic",
+            "--start-error",
+            "0.15,0.5,1",
+        ],
+        &[
+            "--candidates",
+            "60",
+            "--seed",
+            "1",
+            "--until",
+            "identification",
+        ],
+    ]
+    .concat();
+    let output = run(folder.path(), &arguments);
+    assert_eq!(output.status.code(), Some(0), "{}", stderr_of(&output));
+    let found = progress(folder.path());
+    let fit = &found["fit"];
+    let unexplained = |name: &str| fit[name].as_f64().expect("a fraction");
+    assert!(unexplained("validation_relative") < 0.08, "{fit}");
+    let first = found["first_fit"]["validation_relative"].as_f64();
+    assert!(
+        first.is_some_and(|left| left < 0.15),
+        "{}",
+        found["first_fit"]
+    );
+}
+
 /// Without a terminal and without --yes, the arm does not move; the drawing of the swept space exists.
 #[test]
 fn the_swept_space_must_be_confirmed() {

@@ -51,6 +51,7 @@ pub mod select;
 mod selection_result;
 mod stribeck;
 pub mod validate;
+pub mod weigh;
 
 pub use base_parameters::BaseParameters;
 pub use cancellation::Cancellation;

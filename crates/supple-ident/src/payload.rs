@@ -98,35 +98,44 @@ pub fn torque_scale<const N: usize>(
         .validate()
         .map_err(|error| shape_error("known payload", "a physical body", error.to_string()))?;
     let p = parameters_of(known);
-    let mut blocks = vec![
-        ReducedSystem::empty(empty.columns.len() + 2);
-        empty.columns.identified_joints().len()
-    ];
-    let mut independent_fraction: f64 = 1.0;
+    let independent = without.iter().chain(with).map(|m| m.independent_fraction);
+    let independent_fraction = independent.fold(1.0, f64::min);
+    let blocks = blocks_with_load(empty, without, with)?;
+    blocks
+        .iter()
+        .map(|block| torque_scale_from(&block.along(p.as_slice()), independent_fraction))
+        .collect()
+}
+
+/// Returns for each identified joint the system of its torques in the motions `without` and `with` a load at the last link: columns
+/// of the arm, the joint's acceleration, and the ten parameters of the load. The rotor column is always included: the torque of a
+/// known rotor inertia is not scaled.
+pub(crate) fn blocks_with_load<const N: usize>(
+    empty: &Fit<N>,
+    without: &[Motion],
+    with: &[Motion],
+) -> Result<Vec<ReducedSystem>, IdentError> {
+    let arm_columns = empty.columns.len();
+    let identified_joints = empty.columns.identified_joints();
+    let mut blocks = vec![ReducedSystem::empty(arm_columns + 11); identified_joints.len()];
     for (motions, carries) in [(without, false), (with, true)] {
         for motion in motions {
-            independent_fraction = independent_fraction.min(motion.independent_fraction);
             let arm = joint_rows(empty.nominal(), &empty.columns, motion)?;
             let hand = payload_rows(empty, motion)?;
-            for (row, &joint) in empty.columns.identified_joints().iter().enumerate() {
-                let load = &hand[row].a * p * f64::from(u8::from(carries));
-                // Always include the rotor column: the torque of a known rotor inertia is not scaled.
-                let mut a = arm[row]
-                    .a
-                    .clone()
-                    .resize_horizontally(blocks[row].unknowns(), 0.0);
-                a.set_column(empty.columns.len(), &motion.qdd.column(joint));
-                a.set_column(empty.columns.len() + 1, &load);
+            for (row, &joint) in identified_joints.iter().enumerate() {
+                let a = arm[row].a.clone();
+                let mut a = a.resize_horizontally(arm_columns + 11, 0.0);
+                a.set_column(arm_columns, &motion.qdd.column(joint));
+                if carries {
+                    a.columns_mut(arm_columns + 1, 10).copy_from(&hand[row].a);
+                }
                 let tau = motion.tau.column(joint).into_owned();
                 let rows = JointRows::new(a, tau, arm[row].speed.clone());
                 blocks[row].add(&rows.reduced(0.0, None), 1.0);
             }
         }
     }
-    blocks
-        .iter()
-        .map(|block| torque_scale_from(block, independent_fraction))
-        .collect()
+    Ok(blocks)
 }
 
 /// Returns the reciprocal of the last unknown; `None` if the data do not determine it.

@@ -53,6 +53,19 @@ impl ReducedSystem {
         }
     }
 
+    /// Returns the problem with one unknown instead of the last ones, which are this multiple of `direction`.
+    pub(crate) fn along(&self, direction: &[f64]) -> ReducedSystem {
+        let first = self.unknowns() - direction.len();
+        let last = self.stacked.columns(first, direction.len());
+        let mut stacked = self.stacked.columns(0, first + 2).into_owned();
+        stacked.set_column(first, &(last * DVector::from_column_slice(direction)));
+        stacked.set_column(first + 1, &self.stacked.column(self.unknowns()));
+        ReducedSystem {
+            stacked,
+            rows: self.rows,
+        }
+    }
+
     /// Returns `|A x - b|^2`.
     pub fn error_squared(&self, x: &DVector<f64>) -> f64 {
         (self.stacked.columns(0, self.unknowns()) * x - self.stacked.column(self.unknowns()))

@@ -12,7 +12,7 @@ input raises an exception that names argument, expected and actual shape or valu
 
 from supple._base import BaseParameters, base_parameters
 from supple._excite import Excitation, Recording, design_excitation, excite
-from supple._fit import Fit, Payload, Validation
+from supple._fit import Fit, Payload, Validation, Weighing
 from supple._identify import DataWarning, FrictionColumns, identify
 from supple._learn import Learned, learn
 from supple._live import Answer, Refused, SetPoints, State, States, System, connect, simulated
@@ -45,6 +45,7 @@ __all__ = [
     "System",
     "Truth",
     "Validation",
+    "Weighing",
     "__version__",
     "assets",
     "base_parameters",

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-__all__ = ["Fit", "Payload", "Validation"]
+__all__ = ["Fit", "Payload", "Validation", "Weighing"]
 
 
 Ripple = tuple[tuple[tuple[int, float, float], ...], ...]
@@ -62,6 +62,27 @@ class Payload:
             "com_m": _check.array("com_m", self.com_m, (3,)).tolist(),
             "inertia_kg_m2": _check.array("inertia_kg_m2", self.inertia_kg_m2, (3, 3)).tolist(),
         }
+
+
+@dataclass(frozen=True, eq=False)
+class Weighing:
+    """Torque scales and the place of a weight of known mass. Deviations are those of the noise, without errors of the model."""
+
+    torque_scale: tuple[float | None, ...]
+    """Ratio of true to logged torque of each moving joint, (M,); ``None`` if it is not known within 5 %."""
+    torque_scale_deviation: tuple[float, ...]
+    """Standard deviation of each scale, (M,); infinite if the weight does not load the joint."""
+    com_m: Array
+    """Centre of mass of the weight in the last link's frame, (3,) (m)."""
+    com_deviation_m: Array
+    """Standard deviation of each coordinate, (3,) (m)."""
+    warnings: tuple[str, ...]
+    """What the logs do not tell apart, with a remedy."""
+
+    def __repr__(self) -> str:
+        scales = ", ".join("unknown" if scale is None else f"{scale:.3f}" for scale in self.torque_scale)
+        com = ", ".join(f"{x:.4f}" for x in self.com_m)
+        return f"<Weighing: torque scales {scales}; weight at ({com}) m>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,6 +253,43 @@ class Fit:
         """
         payload = _check.instance("known", known, Payload)._dict()
         return tuple(_native.torque_scale(self._fit, log_inputs(t, q, tau, qd, qdd), payload))
+
+    def weigh(
+        self,
+        t: ArrayLike | Sequence[ArrayLike],
+        q: ArrayLike | Sequence[ArrayLike],
+        tau: ArrayLike | Sequence[ArrayLike],
+        qd: ArrayLike | Sequence[ArrayLike] | None = None,
+        qdd: ArrayLike | Sequence[ArrayLike] | None = None,
+        *,
+        mass_kg: float,
+    ) -> Weighing:
+        """Torque scales and the centre of mass of a weight, from logs with a weight of which only the mass is known.
+
+        Every joint has its own scale; all carry the same body. Multiply ``tau`` by the scales and identify again.
+
+        Parameters
+        ----------
+        t, q, tau, qd, qdd
+            The log or logs with the weight at the last link, as in :func:`identify`; prepared like the fitted ones, with
+            the same torque scales.
+        mass_kg : float
+            Mass of the weight (kg).
+
+        Raises
+        ------
+        ValueError
+            As :func:`identify`; if the mass is not positive.
+        """
+        weight_kg = _check.number("mass_kg", mass_kg, positive=True)
+        found = _native.weigh(self._fit, log_inputs(t, q, tau, qd, qdd), weight_kg)
+        return Weighing(
+            torque_scale=tuple(found["torque_scale"]),
+            torque_scale_deviation=tuple(found["torque_scale_deviation"]),
+            com_m=found["com_m"],
+            com_deviation_m=found["com_deviation_m"],
+            warnings=tuple(found["warnings"]),
+        )
 
     def ripple(
         self,

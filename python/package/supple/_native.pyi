@@ -29,6 +29,7 @@ __all__ = [
     "ripple",
     "simulate",
     "torque_scale",
+    "weigh",
 ]
 __version__: str
 
@@ -911,6 +912,9 @@ def torque_scale(
     fit: Fit, logs: list[dict[str, Any]], known: dict[str, Any]
 ) -> list[float | None]:
     """Returns the ratio of true to logged torque of each moving joint; `None` if the known payload adds too little torque."""
+
+def weigh(fit: Fit, logs: list[dict[str, Any]], mass_kg: float) -> dict[str, Any]:
+    """Estimates torque scales and the place of a weight of known mass."""
 
 def ripple(
     fit: Fit,

@@ -216,6 +216,13 @@ pub struct IdentifyArgs {
     /// `estimate`. Default: 1.5 control periods for supple's own logs, which hold commands; otherwise `estimate`.
     #[arg(long, value_name = "S|estimate", value_parser = torque_delay, allow_hyphen_values = true)]
     pub torque_delay: Option<TorqueDelay>,
+    /// Logs with a weight of known mass at the last link, to find the ratio of true to logged torque of each joint and the
+    /// centre of mass of the weight; --weight-kg is its mass.
+    #[arg(long, value_name = "LOG", requires = "weight_kg")]
+    pub weighed: Vec<PathBuf>,
+    /// Mass of the weight in the logs of --weighed (kg).
+    #[arg(long, value_name = "KG", requires = "weighed", value_parser = between(1e-3, 1e3))]
+    pub weight_kg: Option<f64>,
     /// Fit a log even if the checks against the arm find an error in it; the error is then a warning.
     #[arg(long)]
     pub accept_wrong_logs: bool,

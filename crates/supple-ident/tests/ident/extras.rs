@@ -10,6 +10,7 @@ use supple_ident::excitation_design::{
 };
 use supple_ident::learn::with_payload;
 use supple_ident::payload::{parameters_of, payload, torque_scale};
+use supple_ident::weigh::weigh;
 use supple_ident::{
     DMatrix, FrictionColumns, Learning, Motion, Options, RippleSearch, fit, fit_ripple, learn,
 };
@@ -367,4 +368,91 @@ fn a_payload_is_identified_and_a_known_one_gives_the_torque_scale() {
         let none = torque_scale(&found, &empty, &empty, &known_payload()).unwrap();
         assert_eq!(none, [None; 4]);
     }
+}
+
+fn names() -> Vec<String> {
+    (1..=4).map(|number| format!("joint{number}")).collect()
+}
+
+/// A weight of which only the mass is known gives the scales and its place, from motions with noise and gain errors.
+#[test]
+fn a_known_mass_alone_gives_torque_scales_and_its_place() {
+    let arm = wam4().arm;
+    let friction = [Friction::coulomb(1.0, 0.5); 4];
+    let gains = [0.9, 0.8, 1.15, 0.7];
+    let logged = |mut data: Motion, seed: u64| {
+        let mut noise = Random::new(seed);
+        for (j, gain) in gains.into_iter().enumerate() {
+            data.tau
+                .column_mut(j)
+                .iter_mut()
+                .for_each(|t| *t = *t * gain + 0.02 * noise.signed());
+        }
+        [data]
+    };
+    let empty = logged(motion(&arm, &friction, &ALL, 1500, 5), 1);
+    let carried = carrying(&arm, &known_payload());
+    let loaded = logged(motion(&carried, &friction, &ALL, 1500, 6), 2);
+    let plain = Options {
+        consistent_prior_weight: None,
+        ..options()
+    };
+    let found = fit(&arm, &empty, &ALL, &plain).unwrap();
+    let weighing = weigh(&found, &empty, &loaded, known_payload().mass_kg).unwrap();
+    assert_eq!(weighing.warnings(&names()), Vec::<String>::new());
+    for (joint, gain) in gains.into_iter().enumerate() {
+        let scale = weighing.torque_scale[joint].expect("every joint moves the weight");
+        let error = (scale - 1.0 / gain).abs();
+        let deviation = weighing.torque_scale_deviation[joint];
+        assert!(error < 0.01, "joint {joint}: {scale}");
+        assert!(
+            error < 5.0 * deviation,
+            "joint {joint}: {scale}, {deviation}"
+        );
+    }
+    let error_m = weighing.com_m - known_payload().com_m;
+    assert!(error_m.amax() < 5e-3, "{}", weighing.com_m);
+    assert!(error_m.component_div(&weighing.com_deviation_m).amax() < 5.0);
+    // Half the mass at the same place is twice the torque scale.
+    let half = weigh(&found, &empty, &loaded, 0.5 * known_payload().mass_kg).unwrap();
+    for (half, whole) in half.torque_scale.iter().zip(&weighing.torque_scale) {
+        let ratio = half.unwrap_or(f64::NAN) / whole.unwrap_or(f64::NAN);
+        assert!((ratio - 0.5).abs() < 0.02, "{ratio}");
+    }
+    // Nothing was carried.
+    let none = weigh(&found, &empty, &empty, 2.0).unwrap();
+    assert_eq!(none.torque_scale, [None; 4]);
+    assert!(none.warnings(&names())[0].contains("joint1: its torque scale"));
+    assert!(weigh(&found, &empty, &loaded, 0.0).is_err());
+}
+
+/// In one pose gravity alone acts, and one equation per joint cannot tell the scale from the lever of the weight.
+#[test]
+fn scales_are_not_told_apart_in_one_pose() {
+    let arm = wam4().arm;
+    let friction = [Friction::coulomb(1.0, 0.5); 4];
+    let empty = [motion(&arm, &friction, &ALL, 1500, 5)];
+    let carried = carrying(&arm, &known_payload());
+    let mut loaded = motion(&carried, &friction, &ALL, 400, 6);
+    let q = loaded.q.row(0).into_owned();
+    let held = supple_core::Vector::<4>::from_fn(|j, _| q[j]);
+    let gravity_nm = supple_core::dynamics::gravity(&carried, &held);
+    let mut noise = Random::new(3);
+    for i in 0..loaded.samples() {
+        for j in 0..4 {
+            loaded.q[(i, j)] = held[j];
+            (loaded.qd[(i, j)], loaded.qdd[(i, j)]) = (0.0, 0.0);
+            loaded.tau[(i, j)] = gravity_nm[j] + 0.05 * noise.signed();
+        }
+    }
+    let found = fit(&arm, &empty, &ALL, &options()).unwrap();
+    let weighing = weigh(&found, &empty, &[loaded], known_payload().mass_kg).unwrap();
+    assert!(weighing.torque_scale.contains(&None), "{weighing:?}");
+    assert!(
+        weighing
+            .warnings(&names())
+            .iter()
+            .any(|text| text.contains("told apart")),
+        "{weighing:?}"
+    );
 }

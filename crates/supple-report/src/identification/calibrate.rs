@@ -145,6 +145,7 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Resu
             found.validation.clone(),
         )],
         predicted_tracking,
+        weighing: None,
     };
     if args.ripple > 0.0 {
         // The demo uses the plant including its ripple, and adds the other effects itself.

@@ -1,6 +1,7 @@
 //! `supple identify`: identifies a model from logs; the controller can load it.
 
 use super::report::{ReportInput, Summary, html, summary};
+use super::weighing::WeighingResult;
 use crate::progress::Steps;
 use std::path::Path;
 use supple_cli::arguments::{EffectsArg, IdentifyArgs, TorqueDelay};
@@ -10,6 +11,7 @@ use supple_cli::exit::Failure;
 use supple_cli::out::Staging;
 use supple_core::Arm;
 use supple_experiment::predict_tracking_error;
+use supple_ident::weigh::weigh;
 use supple_ident::{
     Effects, Fit, Log, Motion, Preparation, Procedure, Validation, fit_with_stribeck,
     identify_motions, read_logs,
@@ -126,11 +128,12 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Resul
     let moving = procedure.identified_joints(N)?;
     let mut warnings = Vec::new();
     let mut steps = Steps::new(STEPS, args.quiet);
-    let logs = args.logs.len() + args.validate.len();
+    let logs = args.logs.len() + args.validate.len() + args.weighed.len();
     steps.begin(&format!(
         "logs: reading {logs}, checking them against the arm, estimating delays"
     ));
     let mut fitted = motions::<N>(&nominal, &args.logs, &moving, &procedure, &mut warnings)?;
+    let weighed = motions::<N>(&nominal, &args.weighed, &moving, &procedure, &mut warnings)?;
     let mut held_out = motions::<N>(&nominal, &args.validate, &moving, &procedure, &mut warnings)?;
     if held_out.is_empty()
         && let Some((name, motion)) = fitted.first_mut()
@@ -173,6 +176,16 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Resul
     let identified = fit
         .description(arm, None)?
         .with_move_collision(&thresholds)?;
+    let weighing = match args.weight_kg {
+        None => None,
+        Some(weight_kg) => {
+            let loaded: Vec<Motion> = weighed.into_iter().map(|(_, motion)| motion).collect();
+            let found = weigh(&fit, &data, &loaded, weight_kg)?;
+            let names = moving.iter().map(|joint| arm.joint_names()[*joint].clone());
+            let names: Vec<String> = names.collect();
+            Some(WeighingResult::new(weight_kg, &found, &names))
+        }
+    };
     steps.begin("trial runs: the sinusoid at 5 N/m with models drawn from the fit's uncertainty");
     let input = ReportInput {
         arm: &identified,
@@ -184,6 +197,7 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Resul
             .collect(),
         held_out: validated,
         predicted_tracking: predict_tracking_error(&identified, &fit, DRAWS)?,
+        weighing,
     };
     steps.finish();
     let summary = summary(&input);
@@ -254,6 +268,9 @@ pub fn print(summary: &Summary, out: &Path) -> Result<(), Failure> {
             line.log,
             100.0 * line.total_relative
         ))?;
+    }
+    for line in summary.weighing.iter().flat_map(WeighingResult::lines) {
+        print_line(&line)?;
     }
     for warning in &summary.warnings {
         print_line(&format!("warning: {warning}"))?;

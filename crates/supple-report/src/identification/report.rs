@@ -1,5 +1,6 @@
 //! Report of an identification: one self-contained HTML file, and its summary.
 
+use super::weighing::WeighingResult;
 use crate::figures::identification::{Curves, curves};
 use askama::Template;
 use serde::Serialize;
@@ -60,6 +61,9 @@ pub struct Summary {
     pub torque_delay_s: Vec<f64>,
     /// The tracking error of the trial runs.
     pub foretold: Option<TrackingPrediction>,
+    /// Torque scales by a weight of known mass, if one was logged.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub weighing: Option<WeighingResult>,
 }
 
 /// Given and identified parameters of a link.
@@ -141,6 +145,8 @@ pub struct ReportInput<'a, const N: usize> {
     pub held_out: Vec<(String, Motion, Validation)>,
     /// Predicted tracking error; `None` if the arm cannot reach the sinusoid.
     pub predicted_tracking: Option<TrackingPrediction>,
+    /// Torque scales by a weight of known mass.
+    pub weighing: Option<WeighingResult>,
 }
 
 /// Summarises a fit.
@@ -221,6 +227,7 @@ pub fn summary<const N: usize>(input: &ReportInput<'_, N>) -> Summary {
         interval_at_5_n_per_m: interval,
         torque_delay_s: delays_s.collect(),
         foretold: input.predicted_tracking.clone(),
+        weighing: input.weighing.clone(),
     }
 }
 

@@ -271,3 +271,46 @@ fn help_lists_the_identification_commands() {
     }
     assert!(run(&["demo", "--help"]).stdout.contains("--model"));
 }
+
+/// The arm's motors give all of the commanded torque; 300 g are at its tip, 0.36 m from the last joint.
+#[test]
+fn a_weight_of_known_mass_gives_torque_scales() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name);
+    let weight = path("weight.toml");
+    std::fs::write(&weight, "tool_extra_kg = 0.3\n").expect("written");
+    let design = path("design");
+    let done = |arguments: &[&str]| {
+        let answer = run(arguments);
+        assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+        answer.stdout
+    };
+    let arm = ["--arm", "wam4"];
+    let out = ["--candidates", "60", "--quiet", "--out", arg(&design)];
+    done(&[&["excite", "design"][..], &arm, &out].concat());
+    let motion = ["excite", "run", "--no-slow", "--design", arg(&design)];
+    let (empty, loaded) = (path("empty"), path("loaded"));
+    done(&[&motion[..], &arm, &["--out", arg(&empty)]].concat());
+    let with = ["--plant-options", arg(&weight), "--out", arg(&loaded)];
+    done(&[&motion[..], &arm, &with].concat());
+    let log = |of: &Path| of.join("logs/excitation.mcap").display().to_string();
+    let (empty, loaded) = (log(&empty), log(&loaded));
+    let model = path("model");
+    let model = ["--quiet", "--json", "--out", arg(&model)];
+    let weighed = ["identify", &empty, "--weighed", &loaded];
+    let text = done(&[&weighed[..], &["--weight-kg", "0.3"], &arm, &model].concat());
+    let summary: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let weighing = &summary["weighing"];
+    for joint in 1..4 {
+        let scale = weighing["joints"][joint]["torque_scale"].as_f64();
+        assert!(
+            scale.is_some_and(|scale| (scale - 1.0).abs() < 0.02),
+            "{weighing}"
+        );
+    }
+    let along_m = weighing["com_m"][1].as_f64().expect("a number");
+    assert!((along_m + 0.36).abs() < 0.01, "{weighing}");
+    let alone = run(&[&weighed[..], &arm].concat());
+    assert_eq!(alone.code, Some(2), "{}", alone.stderr);
+    assert!(alone.stderr.contains("--weight-kg"), "{}", alone.stderr);
+}

@@ -1,6 +1,6 @@
 //! The motions, and the space that they sweep.
 
-use super::{FLOAT_S, GAINS_S, ModelStage, REST_S, RETURN_S, Run, config};
+use super::{FLOAT_S, GAINS_S, ModelStage, REST_S, RETURN_RAD, Run, config};
 use crate::excite::move_to;
 use crate::procedure::arm::MotionArm;
 use crate::procedure::error::ProcedureError;
@@ -114,13 +114,15 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             .sum();
         let (_, sinusoid_s) = self.start.paths().sinusoid(1.0);
         let first_rad = motions.first.at(0.0).position_rad;
+        let home_rad = &self.home_rad;
+        let return_s = move_to(config, home_rad, &home_rad.add_scalar(RETURN_RAD)).duration_s;
         let returns_s = 9.0 * move_to(config, &first_rad, &self.home_rad).duration_s;
         all + self.options.warm_up_s
             + ramps_s(config)
             + REST_S
             + returns_s
             + FLOAT_S
-            + 2.0 * (sinusoid_s + RETURN_S + GAINS_S)
+            + 2.0 * (sinusoid_s + return_s + GAINS_S)
             + LEARNING_S
     }
 }

@@ -24,8 +24,8 @@ const REST_S: f64 = 1.0;
 const FLOAT_S: f64 = 2.0;
 /// Duration of a change of gains \[s\].
 const GAINS_S: f64 = 0.2;
-/// Duration of the move back to the start of the sinusoid \[s\].
-const RETURN_S: f64 = 1.5;
+/// Distance of each joint from the start of the sinusoid for which the time of the move back suffices \[rad\].
+const RETURN_RAD: f64 = 1.5;
 /// Maximum number of attempts at a motion that contact stops.
 const ATTEMPTS: usize = 3;
 

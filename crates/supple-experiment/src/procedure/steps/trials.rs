@@ -1,6 +1,6 @@
 //! Trials of the identified model: float and sinusoid.
 
-use super::{FLOAT_S, GAINS_S, ModelStage, RETURN_S, Run, config};
+use super::{FLOAT_S, GAINS_S, ModelStage, RETURN_RAD, Run, config};
 use crate::error::ExperimentError;
 use crate::excite::move_to;
 use crate::metrics::Rms;
@@ -97,12 +97,10 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             }
             steps.push(track(lead_s + duration_s));
             // The sinusoid continues until the next request.
-            steps.push(Step::wait(
-                Request::Move {
-                    target_rad: start_rad,
-                    duration_s: RETURN_S,
-                },
-                RETURN_S + GAINS_S,
+            steps.push(move_to(
+                &self.limits,
+                &start_rad,
+                &start_rad.add_scalar(RETURN_RAD),
             ));
             let performed = self.arm.perform(name, &steps)?;
             self.progress.moved_s += performed.moved_s;
@@ -110,6 +108,9 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             result.false_contacts += motion.map_or(0, |motion| motion.contacts);
             if let Some(stopped) = performed.stopped {
                 result.ended = Some(stopped.fault);
+                // Also kept if the arm cannot be held after the fault.
+                self.progress.sinusoid = Some(result.clone());
+                self.progress.write(&self.options.out)?;
                 self.arm.recover()?;
                 continue;
             }
