@@ -358,11 +358,12 @@ run() {
     mkdir -p "$RESULTS"
     rm -f "$WORK/reason-$step"
     echo "==> $step: $(describe "$step")"
+    # The log is for the summary. What a step leaves running may hold its output: nobody waits for `tee`.
     set +e
     (
         set -e
         "step_$step"
-    )
+    ) > >(tee "$WORK/$step.log") 2>&1
     status=$?
     set -e
     case $status in
@@ -374,10 +375,17 @@ run() {
         tee "$RESULTS/$step"
 }
 
-# One line a step (by default every step on record), then the counts; fails where a step failed.
+# The last lines of each step that failed, one line a step (by default every step on record), then the counts; fails where a step
+# failed.
 summary() {
     local step passed=0 failed=0 skipped=0
     [[ $# -gt 0 ]] || set -- $(ls -tr "$RESULTS")
+    for step in "$@"; do
+        if [[ $(cut -d ' ' -f 2 "$RESULTS/$step") == failed ]]; then
+            echo "==> $step failed; its last lines:"
+            grep -av '^ *\(Compiling\|Executable\|Running\) ' "$WORK/$step.log" | tail -n 40 || true
+        fi
+    done
     echo "==> summary"
     for step in "$@"; do
         cat "$RESULTS/$step"
