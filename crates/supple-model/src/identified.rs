@@ -62,7 +62,7 @@ impl Description {
     ) -> Result<Description, ModelError> {
         self.expect_dof(N)?;
         // Joint frames are those of the kinematics; how links are placed in them is the description's own choice.
-        let own = self.config::<N>()?.arm;
+        let own = self.arm::<N>()?;
         let bodies: [Body; N] = core::array::from_fn(|i| {
             model.arm.body(i).expressed_in(&Pose {
                 rotation: own.link_from_joint(i),
