@@ -363,7 +363,7 @@ run() {
     (
         set -e
         "step_$step"
-    ) > >(tee "$WORK/$step.log") 2>&1
+    ) > >(tee "$WORK/step-$step.log") 2>&1
     status=$?
     set -e
     case $status in
@@ -380,10 +380,12 @@ run() {
 summary() {
     local step passed=0 failed=0 skipped=0
     [[ $# -gt 0 ]] || set -- $(ls -tr "$RESULTS")
+    # The logs of the last steps may still be written.
+    sleep 1
     for step in "$@"; do
         if [[ $(cut -d ' ' -f 2 "$RESULTS/$step") == failed ]]; then
             echo "==> $step failed; its last lines:"
-            grep -av '^ *\(Compiling\|Executable\|Running\) ' "$WORK/$step.log" | tail -n 40 || true
+            grep -av '^ *\(Compiling\|Executable\|Running\) ' "$WORK/step-$step.log" | tail -n 40 || true
         fi
     done
     echo "==> summary"

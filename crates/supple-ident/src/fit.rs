@@ -186,7 +186,6 @@ fn effect_prior(column: &Column) -> Option<(f64, f64)> {
         Column::MotorCoulomb(_) | Column::MotorViscous(_) => Some((0.0, 0.5)),
         Column::Tilt(_) => Some((0.0, 0.005)),
         Column::TorqueScale(_) => Some((0.0, 0.03)),
-        Column::Load(_) => Some((0.0, 0.1)),
         _ => None,
     }
 }
@@ -276,11 +275,19 @@ impl FitStage<'_> {
         Some((nominal, relative * nominal))
     }
 
-    /// Returns the rows of the prior of effects and rotors.
+    /// Returns the prior mean and standard deviation of friction by load, in fits with a prior: under a nearly constant load it is
+    /// not told apart from Coulomb friction.
+    fn load_prior(&self, column: &Column) -> Option<(f64, f64)> {
+        let has_prior = self.options.consistent_prior_weight.is_some();
+        (has_prior && matches!(column, Column::Load(_))).then_some((0.0, 0.1))
+    }
+
+    /// Returns the rows of the prior of effects, friction by load and rotors.
     fn effect_prior(&self) -> DMatrix<f64> {
         let known = self.used.iter().enumerate().filter_map(|(k, i)| {
             let column = &self.columns.list()[*i];
-            let (mean, deviation) = effect_prior(column).or_else(|| self.rotor_prior(k, column))?;
+            let prior = effect_prior(column).or_else(|| self.load_prior(column));
+            let (mean, deviation) = prior.or_else(|| self.rotor_prior(k, column))?;
             Some((k, mean, EFFECT_PRIOR_WEIGHT / deviation))
         });
         let known: Vec<_> = known.collect();

@@ -130,7 +130,8 @@ pub(crate) fn blocks_with_load<const N: usize>(
                     a.columns_mut(arm_columns + 1, 10).copy_from(&hand[row].a);
                 }
                 let tau = motion.tau.column(joint).into_owned();
-                let rows = JointRows::new(a, tau, arm[row].speed.clone());
+                let mut rows = JointRows::new(a, tau, arm[row].speed.clone());
+                rows.used.clone_from(&arm[row].used);
                 blocks[row].add(&rows.reduced(0.0, None), 1.0);
             }
         }

@@ -32,13 +32,15 @@ const MAX_COM_DEVIATION_M: f64 = 0.01;
 /// Maximum number of steps of the solver, and relative decrease of the error at which it ends.
 const STEPS: usize = 100;
 const CONVERGED: f64 = 1e-12;
+/// Eigenvalue of normal equations with a unit diagonal below which it is rounding.
+const ROUNDING: f64 = 1e-12;
 
 /// Result of [`weigh`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Weighing {
     /// Ratio of true to logged torque of each identified joint; `None` if the weight does not determine it within 5 %.
     pub torque_scale: Vec<Option<f64>>,
-    /// Standard deviation of each scale; infinite if nothing determines it.
+    /// Relative standard deviation of each scale; infinite if nothing determines it, or if the weight was not carried.
     pub torque_scale_deviation: Vec<f64>,
     /// Centre of mass of the weight in the last link's frame \[m\].
     pub com_m: Vector3<f64>,
@@ -56,7 +58,7 @@ impl Weighing {
             .map(|((name, _), deviation)| {
                 let why = match deviation.is_finite() {
                     true => format!("standard deviation {:.0} %", 100.0 * deviation),
-                    false => "the weight does not load it".to_owned(),
+                    false => "the weight does not load it, or was not carried".to_owned(),
                 };
                 format!(
                     "{name}: its torque scale is not told apart from the place of the weight ({why}); move it through poses in \
@@ -82,10 +84,11 @@ struct JointInformation {
 }
 
 /// Estimates torque scales and the centre of mass of a weight of `mass_kg` at the last link, from the fitted motions `without` it
-/// and motions `with` it. Deviations are those of the residuals' noise; errors of the model are not in them.
+/// and motions `with` it. Deviations are those of the residuals' noise; errors of the model are not in them. Excluded intervals of
+/// the motions are left out; slow samples are not.
 ///
 /// # Errors
-/// A mass that is not positive; shapes that do not agree; motions that determine nothing.
+/// A mass that is not positive; shapes that do not agree; a search that does not converge.
 pub fn weigh<const N: usize>(
     empty: &Fit<N>,
     without: &[Motion],
@@ -196,7 +199,7 @@ impl Problem {
         let mut x = DVector::zeros(SHAPE + self.joints.len());
         x.rows_mut(SHAPE, self.joints.len()).fill(1.0);
         let (mut errors, mut jacobian) = self.errors(&x);
-        let mut damping = 1e-3;
+        let (mut damping, mut decrease) = (1e-3, f64::INFINITY);
         for _ in 0..STEPS {
             let mut normal = jacobian.tr_mul(&jacobian);
             for i in 0..normal.nrows() {
@@ -218,11 +221,15 @@ impl Problem {
             }
             (x, errors, jacobian) = (next, next_errors, next_jacobian);
             damping = (damping * 0.1).max(1e-12);
-            if before - after <= CONVERGED * before {
+            decrease = before - after;
+            if decrease <= CONVERGED * before {
                 break;
             }
         }
-        Ok(x)
+        match decrease.is_finite() && decrease > 1e-3 * errors.norm_squared() {
+            true => Err(undetermined()),
+            false => Ok(x),
+        }
     }
 
     fn result(&self, x: &DVector<f64>) -> Weighing {
@@ -239,15 +246,14 @@ impl Problem {
                 .clone()
                 .map(|i| told_apart(i).then(|| 1.0 / x[i]))
                 .collect(),
-            torque_scale_deviation: joints.map(|i| relative(i) / x[i].abs()).collect(),
+            torque_scale_deviation: joints.map(relative).collect(),
             com_m: Vector3::new(x[0], x[1], x[2]),
             com_deviation_m: Vector3::from_fn(|i, _| deviations[i]),
         }
     }
 }
 
-/// Returns the variances of unknowns with these normal equations; infinite for one without information. What several unknowns leave
-/// undetermined together gets a very large variance.
+/// Returns the variances of unknowns with these normal equations; infinite for one that they do not determine.
 fn variances(normal: &DMatrix<f64>) -> DVector<f64> {
     let size = normal.diagonal().map(f64::sqrt);
     let scaled = DMatrix::from_fn(normal.nrows(), normal.ncols(), |i, j| {
@@ -261,13 +267,13 @@ fn variances(normal: &DMatrix<f64>) -> DVector<f64> {
     let variance = |i: usize| {
         let row = eigen.eigenvectors.row(i);
         let terms = row.iter().zip(&eigen.eigenvalues);
-        let sum: f64 = terms
-            .map(|(v, value)| v * v / value.max(f64::EPSILON))
-            .sum();
-        match size[i] > 0.0 {
-            true => sum / (size[i] * size[i]),
-            false => f64::INFINITY,
+        let is_free = |(v, value): (&f64, &f64)| *value < ROUNDING && v * v > ROUNDING;
+        if size[i] == 0.0 || terms.clone().any(is_free) {
+            return f64::INFINITY;
         }
+        let determined = terms.filter(|(_, value)| **value >= ROUNDING);
+        let sum: f64 = determined.map(|(v, value)| v * v / value).sum();
+        sum / (size[i] * size[i])
     };
     DVector::from_fn(normal.nrows(), |i, _| variance(i))
 }

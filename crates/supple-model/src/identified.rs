@@ -200,7 +200,8 @@ impl Description {
         Description::from_text(&document.to_string(), self.urdf())
     }
 
-    /// Returns the same arm that holds exactly the held joints of `of`, at the same angles and with the same gains.
+    /// Returns the same arm that holds exactly the held joints of `of`, at the same angles and with the same gains, and has the
+    /// same damping of gravity hold.
     ///
     /// # Errors
     /// [`ModelError::JointCount`]; any [`ModelError`] of the edited text.
@@ -208,11 +209,13 @@ impl Description {
         self.expect_dof(of.dof())?;
         let (mut document, mut other) = (self.document()?, of.document()?);
         for joint in 0..self.dof() {
-            let held = of.joint_table(&mut other, joint)?.remove("held");
-            let table = self.joint_table(&mut document, joint)?;
-            table.remove("held");
-            if let Some(held) = held {
-                table.insert("held", held);
+            for key in ["held", "hold_damping_nm_s_per_rad"] {
+                let given = of.joint_table(&mut other, joint)?.remove(key);
+                let table = self.joint_table(&mut document, joint)?;
+                match given {
+                    Some(given) => _ = table.insert(key, given),
+                    None => _ = table.remove(key),
+                }
             }
         }
         Description::from_text(&document.to_string(), self.urdf())

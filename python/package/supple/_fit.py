@@ -71,7 +71,7 @@ class Weighing:
     torque_scale: tuple[float | None, ...]
     """Ratio of true to logged torque of each moving joint, (M,); ``None`` if it is not known within 5 %."""
     torque_scale_deviation: tuple[float, ...]
-    """Standard deviation of each scale, (M,); infinite if the weight does not load the joint."""
+    """Relative standard deviation of each scale, (M,); infinite if the weight does not load the joint, or was not carried."""
     com_m: Array
     """Centre of mass of the weight in the last link's frame, (3,) (m)."""
     com_deviation_m: Array

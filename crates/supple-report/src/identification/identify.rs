@@ -87,7 +87,7 @@ fn all_mcap(args: &IdentifyArgs) -> bool {
         path.extension()
             .is_some_and(|extension| extension == "mcap")
     };
-    args.logs.iter().all(is_mcap)
+    args.logs.iter().chain(&args.weighed).all(is_mcap)
 }
 
 /// Returns the speed below which samples of a joint are excluded from the fit and used to fit the Stribeck effect; `None` if no
@@ -133,7 +133,18 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Resul
         "logs: reading {logs}, checking them against the arm, estimating delays"
     ));
     let mut fitted = motions::<N>(&nominal, &args.logs, &moving, &procedure, &mut warnings)?;
-    let weighed = motions::<N>(&nominal, &args.weighed, &moving, &procedure, &mut warnings)?;
+    // The checks are those of an arm without a weight, with torques to scale.
+    let unchecked = Procedure {
+        accept_wrong_logs: true,
+        ..procedure.clone()
+    };
+    let weighed = motions::<N>(
+        &nominal,
+        &args.weighed,
+        &moving,
+        &unchecked,
+        &mut Vec::new(),
+    )?;
     let mut held_out = motions::<N>(&nominal, &args.validate, &moving, &procedure, &mut warnings)?;
     if held_out.is_empty()
         && let Some((name, motion)) = fitted.first_mut()

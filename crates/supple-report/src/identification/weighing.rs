@@ -25,7 +25,7 @@ pub struct JointTorqueScale {
     pub joint: String,
     /// Ratio of true to logged torque; `None` if it is not known within 5 %.
     pub torque_scale: Option<f64>,
-    /// Its standard deviation; `None` if the weight does not load the joint.
+    /// Its relative standard deviation; `None` if the weight does not load the joint.
     pub deviation: Option<f64>,
 }
 
@@ -61,8 +61,9 @@ impl WeighingResult {
         for joint in &self.joints {
             lines.push(match (joint.torque_scale, joint.deviation) {
                 (Some(scale), Some(deviation)) => format!(
-                    "{}: true over logged torque {scale:.4}, standard deviation {deviation:.4}",
-                    joint.joint
+                    "{}: true over logged torque {scale:.4}, standard deviation {:.2} %",
+                    joint.joint,
+                    100.0 * deviation
                 ),
                 _ => format!("{}: true over logged torque unknown", joint.joint),
             });

@@ -43,6 +43,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             Some(stopped) => {
                 self.report(&format!("float ended by a fault: {}", stopped.fault));
                 self.progress.float_ended = Some(stopped.fault);
+                self.progress.write(&self.options.out)?;
                 self.arm.recover()?;
             }
         }
