@@ -69,8 +69,13 @@ fn runs_in_virtual_time_give_equal_logs_with_learning() {
 
 #[test]
 fn learning_is_switched_shown_saved_and_reset() {
-    let up = Up::tracking(&["--plant", "sim", "--no-log"]);
-    let status = up.wait_until("tracking", |status| status["mode"] == "track");
+    Up::while_tracking(&["--plant", "sim", "--no-log"], |up| {
+        switch_show_save_and_reset(up);
+    });
+}
+
+fn switch_show_save_and_reset(up: &Up) {
+    let status = json(&up.run(&["status", "--json"]));
     assert_eq!(status["learning"]["on"], false);
     assert_eq!(status["learning"]["frozen"], "off");
     assert_eq!(status["learning"]["payload_kg"], 0.0);

@@ -162,7 +162,12 @@ fn idle_is_accepted_without_its_socket() {
 /// The arm of the running system is the default; another arm is refused.
 #[test]
 fn commands_use_the_arm_of_the_running_system() {
-    let up = Up::tracking(&["--plant", "sim", "--no-log", "--arm", "wam3"]);
+    Up::while_tracking(&["--plant", "sim", "--no-log", "--arm", "wam3"], |up| {
+        commands_use_the_arm(up)
+    });
+}
+
+fn commands_use_the_arm(up: &Up) {
     let tracked = up.run(&["track", "arc"]);
     assert!(tracked.status.success(), "{}", stderr_of(&tracked));
     for command in [&["track", "arc"][..], &["probe"]] {

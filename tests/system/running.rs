@@ -5,6 +5,7 @@ use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::CommandExt;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::path::Path;
 use std::process::{Child, Command, Output, Stdio};
 use tempfile::TempDir;
@@ -85,6 +86,28 @@ impl Up {
             last = format!("{status}: {}", stderr_of(&up.end()));
         }
         panic!("the system did not track: {last}");
+    }
+
+    /// Runs a scenario with a system that tracks at its beginning. If a stall of the machine makes the drives idle, which ends tracking,
+    /// so that the scenario panics, runs it again with a new system, at most [`STARTS`] times.
+    pub fn while_tracking(arguments: &[&str], scenario: impl Fn(&mut Up)) {
+        for later in (0..STARTS).rev() {
+            let mut up = Up::tracking(arguments);
+            let Err(panic) = catch_unwind(AssertUnwindSafe(|| scenario(&mut up))) else {
+                return;
+            };
+            if later == 0 || !up.has_stalled() {
+                resume_unwind(panic);
+            }
+            eprintln!("the drives became idle: the scenario begins again");
+        }
+    }
+
+    /// Whether the system is active and its drives are idle: this is so after a stall, and not after a request of the operator.
+    fn has_stalled(&self) -> bool {
+        let output = self.run(&["status", "--json"]);
+        let status: Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
+        status["drives"] == "idle" && status["mode"] == "gravity_hold"
     }
 
     pub fn run(&self, arguments: &[&str]) -> Output {

@@ -12,46 +12,35 @@ path = [[0.5, 0.0, 0.0, 0.0], [2.0, 0.0, 0.1, 0.05], [4.0, -0.06, 0.0, 0.1], [6.
 /// measured at 5 N/m: 6.6 mm, due to dry friction at rests and reversals.
 const MAX_RMS_M: f64 = 10e-3;
 
-/// Number of attempts, of which one must run without a stall: the drives of a stalled system become idle and stay idle.
-const ATTEMPTS: usize = 4;
-
 #[test]
 fn a_motion_taught_by_hand_is_recorded_and_repeated() {
     let folder = crate::running::temporary_folder();
     let options = folder.path().join("hand.toml");
     std::fs::write(&options, HAND).expect("written");
     let options = options.to_str().expect("a name");
-    let attempt = || {
-        let up = Up::tracking(&["--plant", "sim", "--no-log", "--plant-options", options]);
-        teach_and_play(&up)
-    };
-    assert!((0..ATTEMPTS).any(|_| attempt().is_some()), "stalled");
+    let how = ["--plant", "sim", "--no-log", "--plant-options", options];
+    Up::while_tracking(&how, |up| teach_and_play(up));
 }
 
-/// Runs a command and returns its answer; `None` if the host stalled, so that the drives are idle.
-fn answer(up: &Up, arguments: &[&str]) -> Option<Value> {
+fn answer(up: &Up, arguments: &[&str]) -> Value {
     let output = up.run(arguments);
-    let status = json(&up.run(&["status", "--json"]));
-    if status["drives"] == "idle" {
-        return None;
-    }
-    assert!(output.status.success(), "{}{status}", stderr_of(&output));
-    Some(json(&output))
+    assert!(output.status.success(), "{}", stderr_of(&output));
+    json(&output)
 }
 
-fn teach_and_play(up: &Up) -> Option<()> {
-    let taught = answer(up, &["teach", "shown.csv", "--for", "7", "--json"])?;
+fn teach_and_play(up: &Up) {
+    let taught = answer(up, &["teach", "shown.csv", "--for", "7", "--json"]);
     let shown_s = taught["duration_s"].as_f64().expect("a duration");
     assert!((4.0..7.0).contains(&shown_s), "{taught}");
-    let status = answer(up, &["status", "--json"])?;
+    let status = answer(up, &["status", "--json"]);
     assert_eq!(status["mode"], "gravity_hold", "{status}");
     assert!(status["fault"].is_null(), "{status}");
 
-    let played = answer(up, &["play", "shown.csv", "--stiffness", "5", "--json"])?;
+    let played = answer(up, &["play", "shown.csv", "--stiffness", "5", "--json"]);
     let rms_m = played["rms_error_m"].as_f64().expect("an error");
     assert!(rms_m < MAX_RMS_M, "{played}");
     assert_eq!(played["slowdown"], 1.0, "{played}");
-    let status = answer(up, &["status", "--json"])?;
+    let status = answer(up, &["status", "--json"]);
     assert_eq!(status["mode"], "track", "{status}");
     assert_eq!(status["stiffness_n_per_m"][0], 5.0, "{status}");
 
@@ -68,7 +57,7 @@ fn teach_and_play(up: &Up) -> Option<()> {
     );
     let file = up.folder.path().join("points.csv");
     std::fs::write(&file, waypoints).expect("written");
-    let tracked = answer(up, &["track", "points.csv", "--speed", "0.5", "--json"])?;
+    let tracked = answer(up, &["track", "points.csv", "--speed", "0.5", "--json"]);
     assert!(tracked["set_points"].as_u64() > Some(5), "{tracked}");
 
     // A motion that is out of reach is refused completely before the arm moves.
@@ -81,5 +70,4 @@ fn teach_and_play(up: &Up) -> Option<()> {
     assert!(stderr_of(&wrong).contains("no column z_m"));
     let neither = up.run(&["track", "square"]);
     assert_eq!(neither.status.code(), Some(2), "{}", stderr_of(&neither));
-    Some(())
 }

@@ -99,8 +99,10 @@ fn seven_joints_run_as_processes() {
 
 #[test]
 fn a_running_system_executes_or_refuses_requests() {
-    let mut up = Up::tracking(&["--plant", "sim", "--json"]);
+    Up::while_tracking(&["--plant", "sim", "--json"], execute_or_refuse_requests);
+}
 
+fn execute_or_refuse_requests(up: &mut Up) {
     let output = up.run(&[
         "gains",
         "--stiffness",
