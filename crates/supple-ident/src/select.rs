@@ -1,7 +1,8 @@
 //! Model selection by cross-validation.
 //!
-//! The log is divided into consecutive parts, the folds; each fold is predicted from a fit to the others. Among the candidates
-//! within a tolerance of the smallest error, the one with the fewest columns is selected.
+//! The logs are divided into folds: with three logs of the same kind or more, whole logs, otherwise consecutive parts of each. Each
+//! fold is predicted from a fit to the others. Among the candidates that are at most a standard error worse than the best one, the
+//! one with the fewest columns is selected; among those with the same number of columns, the first of the list.
 
 use crate::columns::{Columns, FrictionColumns};
 use crate::effects::Effects;
@@ -12,11 +13,12 @@ use crate::motion::Motion;
 use crate::options::{Options, Weights};
 use crate::regressor::joint_rows;
 pub use crate::selection_result::{Candidate, CandidateResult, SelectionTable};
+use std::ops::Range;
 use supple_core::Arm;
 use supple_core::friction::LoadTorque;
 
-/// Relative tolerance within which candidates count as equally good.
-const TIE: f64 = 0.005;
+/// Ratio of the accelerations of two motions above which they are not of the same kind.
+const SAME_KIND: f64 = 3.0;
 
 /// Returns the friction models from none to the richest, with all other options as in `base`.
 pub fn friction_candidates(base: &Options) -> Vec<Candidate> {
@@ -86,7 +88,7 @@ pub fn load_candidates(base: &Options) -> Vec<Candidate> {
     .to_vec()
 }
 
-/// Widths of the band around standstill, with all other options as in `base`.
+/// Widths of the band around standstill, the default first, with all other options as in `base`.
 pub fn band_candidates(base: &Options) -> Vec<Candidate> {
     let candidate = |band_rad_per_s: f64| Candidate {
         name: format!("band {band_rad_per_s} rad/s"),
@@ -98,7 +100,7 @@ pub fn band_candidates(base: &Options) -> Vec<Candidate> {
             ..base.clone()
         },
     };
-    [0.005, 0.01, 0.015, 0.02, 0.03, 0.05]
+    [0.01, 0.005, 0.015, 0.02, 0.03, 0.05, 0.1]
         .map(candidate)
         .to_vec()
 }
@@ -174,6 +176,7 @@ pub fn compare<const N: usize>(
             must: "2 or more, with at least one candidate",
         });
     }
+    let folds = fold_ranges(motions, parts);
     let mut results = Vec::new();
     let mut reason = None;
     for candidate in candidates {
@@ -186,89 +189,139 @@ pub fn compare<const N: usize>(
             &options.couplings,
         )?
         .with_effects(&options.effects);
-        let folds = folds(nominal, &columns, motions, parts)?;
+        let folds = rows_of_folds(nominal, &columns, motions, &folds)?;
         let outcome = held_out(nominal, &columns, &folds, options);
         // A cancelled comparison has no result, even if a candidate failed for another reason.
         options.cancellation.check()?;
-        let (errors, total) = outcome.unwrap_or_else(|error| {
+        let squares = outcome.unwrap_or_else(|error| {
             reason = Some(error);
-            (Vec::new(), f64::INFINITY)
+            Vec::new()
         });
         results.push(CandidateResult {
             candidate: candidate.clone(),
             columns: columns.len(),
-            parts: errors,
-            total,
+            total: match squares.is_empty() {
+                true => f64::INFINITY,
+                false => mean(&squares).sqrt(),
+            },
+            folds: squares.into_iter().map(f64::sqrt).collect(),
         });
     }
-    let lowest = results
-        .iter()
-        .map(|line| line.total)
-        .fold(f64::INFINITY, f64::min);
-    if let (false, Some(reason)) = (lowest.is_finite(), reason) {
+    let best = (0..results.len())
+        .min_by(|a, b| results[*a].total.total_cmp(&results[*b].total))
+        .unwrap_or(0);
+    if let (false, Some(reason)) = (results[best].total.is_finite(), reason) {
         return Err(reason);
     }
-    let good = (0..results.len()).filter(|i| results[*i].total <= lowest * (1.0 + TIE));
-    let chosen = good.min_by(|a, b| {
-        let (a, b) = (&results[*a], &results[*b]);
-        a.columns.cmp(&b.columns).then(a.total.total_cmp(&b.total))
-    });
+    let within = |i: &usize| results[*i].is_as_good_as(&results[best]);
+    let chosen = (0..results.len())
+        .filter(within)
+        .min_by_key(|i| results[*i].columns);
     Ok(SelectionTable {
-        chosen: chosen.unwrap_or(0),
+        chosen: chosen.unwrap_or(best),
         candidates: results,
     })
 }
 
 type Fold = Vec<Vec<JointRows>>;
 
+/// Returns for each fold the samples of each motion that it contains. With three motions of the same kind or more, a fold contains
+/// whole motions, so that a model is judged on logs that it was not fitted to; otherwise a part of each motion.
+fn fold_ranges(motions: &[Motion], parts: usize) -> Vec<Vec<(usize, Range<usize>)>> {
+    let rms = |m: &Motion| (m.qdd.norm_squared() / m.qdd.len().max(1) as f64).sqrt();
+    let (least, greatest) = motions
+        .iter()
+        .map(rms)
+        .fold((f64::INFINITY, 0.0_f64), |(least, greatest), rms| {
+            (least.min(rms), greatest.max(rms))
+        });
+    if motions.len() >= 3 && greatest < SAME_KIND * least {
+        let folds = motions.len().min(parts);
+        let mut ranges = vec![Vec::new(); folds];
+        for (i, motion) in motions.iter().enumerate() {
+            ranges[i % folds].push((i, 0..motion.samples()));
+        }
+        return ranges;
+    }
+    let of_fold = |p: usize| {
+        let part = |(i, motion): (usize, &Motion)| {
+            let samples = motion.samples();
+            (i, p * samples / parts..(p + 1) * samples / parts)
+        };
+        motions.iter().enumerate().map(part).collect()
+    };
+    (0..parts).map(of_fold).collect()
+}
+
 /// Returns for each fold the rows of every motion and joint.
-fn folds<const N: usize>(
+fn rows_of_folds<const N: usize>(
     nominal: &Arm<N>,
     columns: &Columns,
     motions: &[Motion],
-    parts: usize,
+    folds: &[Vec<(usize, Range<usize>)>],
 ) -> Result<Vec<Fold>, IdentError> {
-    let mut folds = vec![Vec::new(); parts];
-    for motion in motions {
-        let joints = joint_rows(nominal, columns, motion)?;
-        let samples = motion.samples();
-        for (p, fold) in folds.iter_mut().enumerate() {
-            let range = p * samples / parts..(p + 1) * samples / parts;
-            fold.push(
-                joints
-                    .iter()
-                    .map(|joint| joint.part(range.clone()))
-                    .collect(),
-            );
-        }
-    }
-    Ok(folds)
+    let all: Vec<Vec<JointRows>> = motions
+        .iter()
+        .map(|motion| joint_rows(nominal, columns, motion))
+        .collect::<Result<_, _>>()?;
+    let part = |(i, range): &(usize, Range<usize>)| {
+        all[*i]
+            .iter()
+            .map(|joint| joint.part(range.clone()))
+            .collect()
+    };
+    Ok(folds
+        .iter()
+        .map(|fold| fold.iter().map(part).collect())
+        .collect())
 }
 
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// Returns for each joint the square of the torque by which its residuals are divided: its own variance of torque times the mean
+/// variance of all joints, square root. With its own alone the weak joints of the wrist decide, with the mean alone the shoulder.
+fn scales_nm2(folds: &[Fold]) -> Vec<f64> {
+    let joints = folds[0].first().map_or(0, Vec::len);
+    let variance = |j: usize| {
+        let rows = folds.iter().flatten();
+        let torques: Vec<f64> = rows.flat_map(|rows| rows[j].torques()).collect();
+        let middle = mean(&torques);
+        let squares: Vec<f64> = torques.iter().map(|tau| (tau - middle).powi(2)).collect();
+        mean(&squares).max(f64::EPSILON)
+    };
+    let own: Vec<f64> = (0..joints).map(variance).collect();
+    let all = mean(&own);
+    own.iter().map(|own| (own * all).sqrt()).collect()
+}
+
+/// Returns for each fold the mean over the joints of the squared residual divided by the joint's scale.
 fn held_out<const N: usize>(
     nominal: &Arm<N>,
     columns: &Columns,
     folds: &[Fold],
     options: &Options,
-) -> Result<(Vec<f64>, f64), IdentError> {
-    let (mut errors, mut error, mut torque) = (Vec::new(), 0.0, 0.0);
+) -> Result<Vec<f64>, IdentError> {
     // Reduce the rows before the folds are copied: each fold is used by all fits but one.
     for rows in folds.iter().flatten().flatten() {
         rows.block(options.slow_rad_per_s);
     }
+    let scales_nm2 = scales_nm2(folds);
+    let mut errors = Vec::new();
     for (p, fold) in folds.iter().enumerate() {
         let others: Fold = (0..folds.len())
             .filter(|other| *other != p)
             .flat_map(|other| folds[other].clone())
             .collect();
         let fit = fit_rows(nominal, columns.clone(), &others, 1.0, options)?;
-        let rows = || fold.iter().flatten();
-        let squared = |values: Vec<f64>| values.iter().map(|v| v * v).sum::<f64>();
-        let residual: f64 = rows().map(|r| squared(r.residual(&fit.x))).sum();
-        let scale: f64 = rows().map(|r| squared(r.torques())).sum();
-        errors.push((residual / scale).sqrt());
-        error += residual;
-        torque += scale;
+        let of_joint = |(j, scale_nm2): (usize, &f64)| {
+            let residuals = fold.iter().flat_map(|rows| rows[j].residual(&fit.x));
+            let squares: Vec<f64> = residuals.map(|nm| nm * nm).collect();
+            mean(&squares) / scale_nm2
+        };
+        let of_joints: Vec<f64> = scales_nm2.iter().enumerate().map(of_joint).collect();
+        errors.push(mean(&of_joints));
     }
-    Ok((errors, (error / torque).sqrt()))
+    Ok(errors)
 }

@@ -19,10 +19,31 @@ pub struct CandidateResult {
     pub candidate: Candidate,
     /// Number of columns of its regressor.
     pub columns: usize,
-    /// `|tau - tau_hat| / |tau|` of each part, from a fit to the others; empty if the fit failed.
-    pub parts: Vec<f64>,
-    /// Error over all parts; infinite if the fit failed.
+    /// Error of each fold, from a fit to the others: the residual of each joint divided by the geometric mean of the deviations of its
+    /// torque and of all torques, root mean square over the joints; empty if the fit failed.
+    pub folds: Vec<f64>,
+    /// Root mean square over all folds; infinite if the fit failed.
     pub total: f64,
+}
+
+impl CandidateResult {
+    /// Returns whether this candidate predicts as well as `best` does: the mean difference of their squared errors is at most its
+    /// standard error over the folds.
+    pub fn is_as_good_as(&self, best: &CandidateResult) -> bool {
+        let differences: Vec<f64> = self
+            .folds
+            .iter()
+            .zip(&best.folds)
+            .map(|(a, b)| a * a - b * b)
+            .collect();
+        let n = differences.len() as f64;
+        if n < 2.0 {
+            return false;
+        }
+        let mean = differences.iter().sum::<f64>() / n;
+        let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
+        mean <= (variance / n).sqrt()
+    }
 }
 
 /// Results of all candidates, and the selected one.

@@ -4,7 +4,9 @@ use crate::support::{motion, random_arm};
 use supple_core::dynamics::gravity;
 use supple_core::friction::LoadTorque;
 use supple_core::{Friction, Vector};
-use supple_ident::select::{compare, friction_candidates, load_candidates, prior_candidates};
+use supple_ident::select::{
+    Candidate, CandidateResult, compare, friction_candidates, load_candidates, prior_candidates,
+};
 use supple_ident::{
     DMatrix, FrictionColumns, IdentError, Motion, Options, Procedure, fit, identify_motions,
 };
@@ -109,6 +111,49 @@ fn a_wrong_prior_gets_a_small_weight_and_a_right_one_a_large_weight() {
         right.gravity(),
     );
     assert!(weight(right) > weight(wrong.unwrap()));
+}
+
+/// With three logs of the same kind or more, a fold is made of whole logs.
+#[test]
+fn logs_of_the_same_kind_are_held_out_whole() {
+    let model = random_arm::<3>(61);
+    let fast = noisy(Friction::coulomb(0.6, 1.0));
+    let mut slow = fast.clone();
+    slow.qdd *= 0.1;
+    let folds = |motions: &[Motion]| {
+        let candidates = [Candidate {
+            name: "one".to_owned(),
+            options: base(),
+        }];
+        let table = compare(&model, motions, &JOINTS, &candidates, 4).unwrap();
+        table.candidates[0].folds.len()
+    };
+    let [a, b, c] = [fast.clone(), fast.clone(), fast.clone()];
+    assert_eq!(folds(&[a.clone(), b.clone()]), 4);
+    assert_eq!(folds(&[a.clone(), b.clone(), c.clone()]), 3);
+    assert_eq!(folds(&[a.clone(), b.clone(), slow]), 4);
+    assert_eq!(folds(&[a.clone(), b.clone(), c, a, b]), 4);
+}
+
+#[test]
+fn a_candidate_is_as_good_if_it_is_within_a_standard_error() {
+    let result = |folds: &[f64]| CandidateResult {
+        candidate: Candidate {
+            name: String::new(),
+            options: base(),
+        },
+        columns: 1,
+        folds: folds.iter().map(|square| square.sqrt()).collect(),
+        total: 0.0,
+    };
+    let best = result(&[1.0, 2.0, 3.0, 4.0]);
+    // Mean difference 0.1, standard error over the folds 0.06.
+    assert!(!result(&[1.0, 2.1, 3.2, 4.1]).is_as_good_as(&best));
+    // Mean difference 0.1, standard error 0.2.
+    assert!(result(&[1.5, 1.7, 3.1, 4.1]).is_as_good_as(&best));
+    assert!(best.is_as_good_as(&best));
+    let failed = result(&[]);
+    assert!(!failed.is_as_good_as(&best));
 }
 
 #[test]
