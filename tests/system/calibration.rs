@@ -1,4 +1,4 @@
-//! Tests of `supple calibrate --plant`, which calibrates an arm through the processes.
+//! Tests of `supple calibrate --plant` and of its single steps, which move an arm through the processes.
 
 use crate::running::{json, run, stderr_of, supple, temporary_folder};
 use rustix::process::{Pid, Signal, kill_process};
@@ -181,4 +181,60 @@ fn the_swept_space_must_be_confirmed() {
         );
     }
     assert_eq!(steps(&progress(folder.path())), ["wiring"]);
+}
+
+/// `breakaway`, `excite run` and `learn` move an arm of processes, or one in this process, as `calibrate` does, after the swept space is
+/// confirmed; `identify` takes the log of the excitation, `learn` refits the model that it found.
+#[test]
+fn single_steps_run_without_a_calibration() {
+    let folder = temporary_folder();
+    let must = |arguments: &[&str]| {
+        let output = run(folder.path(), arguments);
+        assert!(output.status.success(), "{}", stderr_of(&output));
+        output
+    };
+    let emulated = ["--plant", "emu", "--virtual-time", "--realistic", "--yes"];
+    let breakaway = must(&[&["breakaway", "--json"], &emulated[..]].concat());
+    let breakaway = json(&breakaway);
+    let joints = breakaway.as_array().expect("a list");
+    assert_eq!(joints.len(), 4, "{breakaway}");
+    for joint in joints {
+        let nm = joint["breakaway_nm"].as_f64().expect("a torque");
+        assert!((0.2..3.0).contains(&nm), "{breakaway}");
+    }
+
+    let design = ["--period", "6", "--periods", "1", "--candidates", "30"];
+    let designed = [
+        "excite", "design", "--arm", "wam4", "--out", "design", "--quiet",
+    ];
+    must(&[&designed, &design[..]].concat());
+    let excite = ["excite", "run", "--arm", "wam4", "--design", "design"];
+    let here = ["--plant", "in-process", "--realistic", "--yes"];
+    let unconfirmed = ["--plant", "in-process", "--out", "refused"];
+    let refused = run(folder.path(), &[&excite, &unconfirmed[..]].concat());
+    assert!(
+        stderr_of(&refused).contains("sweep.svg"),
+        "{}",
+        stderr_of(&refused)
+    );
+    assert!(!folder.path().join("refused/logs/excitation.mcap").exists());
+
+    let excited = must(&[&excite, &here[..], &["--out", "excited", "--json"]].concat());
+    let log = json(&excited)["log"].as_str().expect("a log").to_owned();
+    must(&[
+        "identify", &log, "--arm", "wam4", "--out", "model", "--quiet",
+    ]);
+    let learn = ["learn", "--arm", "wam4", "--model", "model", "--for", "10"];
+    let learnt = must(&[&learn, &here[..], &["--out", "learnt", "--json"]].concat());
+    let learnt = json(&learnt);
+    let error = &learnt["joints"][1]["error_nm"];
+    assert!(error[1].as_f64() < error[0].as_f64(), "{learnt}");
+    assert!(folder.path().join("learnt/arm.toml").exists());
+
+    let effects = run(
+        folder.path(),
+        &["learn", "a.mcap", "--arm", "wam4", "--realistic"],
+    );
+    assert_eq!(effects.status.code(), Some(2), "{}", stderr_of(&effects));
+    assert!(stderr_of(&effects).contains("effects of a simulated arm"));
 }

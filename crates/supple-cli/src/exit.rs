@@ -261,6 +261,12 @@ pub enum Failure {
          --plant sim"
     )]
     HandNeedsMode,
+    /// Effects of a simulated arm were given with logs.
+    #[error(
+        "--realistic and --plant-options are effects of a simulated arm, which a log does not need: leave them out, or give \
+         --plant instead of the log"
+    )]
+    EffectsWithoutArm,
     /// The system under test did not reach tracking mode.
     #[error(
         "the system did not reach tracking mode within 20 s in three attempts: see the messages of its \
@@ -548,6 +554,7 @@ impl Failure {
             Failure::OptionsOfRealArm
             | Failure::MisbehaviourWithoutMotors
             | Failure::NoDrivesForArm { .. } => 2,
+            Failure::EffectsWithoutArm => 2,
             Failure::HandNeedsMode | Failure::NoBus { .. } | Failure::NoSuchEffect { .. } => 2,
             Failure::PlantOptions(error) => plant_options_code(error),
             Failure::NoSuchProcess { .. } | Failure::NoSuchTestCase { .. } => 2,
@@ -688,6 +695,7 @@ mod tests {
             (Failure::VirtualTimeOnRealBus, "invalid command line"),
             (Failure::FaultTestOnRealArm, "invalid command line"),
             (Failure::NoSuchProcess { name: "" }, "invalid command line"),
+            (Failure::EffectsWithoutArm, "invalid command line"),
             (Failure::OptionsOfRealArm, "invalid command line"),
             (Failure::NoBus { option: "" }, "invalid command line"),
             (Failure::MisbehaviourWithoutMotors, "invalid command line"),

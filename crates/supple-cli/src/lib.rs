@@ -9,6 +9,7 @@
 pub mod arguments;
 pub mod arms;
 pub mod console;
+pub mod excitation_design;
 pub mod exit;
 pub mod interrupt;
 pub mod log;

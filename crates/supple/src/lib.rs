@@ -5,13 +5,13 @@
 
 #![forbid(unsafe_code)]
 
-mod calibrate;
 mod cli;
 mod doctor;
 mod drill;
 mod man;
 mod motors;
 mod operate;
+mod procedure;
 mod ros;
 mod sweep;
 mod up;
@@ -21,7 +21,7 @@ use clap::CommandFactory;
 use cli::{Cli, Command};
 use std::os::unix::process::CommandExt;
 use std::process::ExitCode;
-use supple_cli::arguments::{IdentificationCommand, LogCommand, OfflineCommand};
+use supple_cli::arguments::{ExciteCommand, IdentificationCommand, LogCommand, OfflineCommand};
 use supple_cli::exit::Failure;
 use supple_cli::sibling::program_beside;
 use supple_cli::{arms, console, interrupt, log};
@@ -39,10 +39,9 @@ pub fn run() -> ExitCode {
 
 fn dispatch(command: &Command) -> Result<(), Failure> {
     if let Command::Offline(OfflineCommand::Identification(command)) = command
-        && let IdentificationCommand::Calibrate(args) = command
-        && let Some(on) = args.on
+        && let Some(result) = with_moved_arm(command)
     {
-        return calibrate::run(args, on);
+        return result;
     }
     match command {
         Command::Offline(
@@ -86,6 +85,19 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
             console::print_line(String::from_utf8_lossy(&script).trim_end())
         }
     }
+}
+
+/// Runs an identification command with `--plant`; `None` without it.
+fn with_moved_arm(command: &IdentificationCommand) -> Option<Result<(), Failure>> {
+    Some(match command {
+        IdentificationCommand::Calibrate(args) => procedure::calibrate(args, args.moved.on?),
+        IdentificationCommand::Breakaway(args) => procedure::breakaway(args, args.moved.on?),
+        IdentificationCommand::Excite(ExciteCommand::Run(args)) => {
+            procedure::excite(args, args.moved.on?)
+        }
+        IdentificationCommand::Learn(args) => procedure::learn(args, args.moved.on?),
+        _ => return None,
+    })
 }
 
 /// Replaces this process with `supple-report`, with the same arguments. Returns only if that fails.

@@ -21,7 +21,7 @@ pub enum IdentificationCommand {
     /// Design and run an excitation for identification.
     #[command(subcommand)]
     Excite(ExciteCommand),
-    /// Measure the breakaway torque of each joint of the simulated arm.
+    /// Measure the breakaway torque of each joint: of the simulated arm, or of an arm or system with --plant.
     #[command(after_help = CODES)]
     Breakaway(BreakawayArgs),
     /// Calibrate an arm: wiring, breakaway, excitation, identification, validation, sinusoid at 5 N/m.
@@ -36,7 +36,7 @@ pub enum IdentificationCommand {
     /// samples of an excitation. For comparison, the command also runs this program's fit of the same arm.
     #[command(after_help = CODES)]
     CalibratePaper(CalibratePaperArgs),
-    /// Refit friction and payload from logs of a repeated motion.
+    /// Refit friction and payload from logs of a repeated motion, or with --plant from a sinusoid that the arm then tracks.
     #[command(after_help = CODES)]
     Learn(LearnArgs),
 }
@@ -47,7 +47,7 @@ pub enum ExciteCommand {
     /// Design an excitation trajectory that makes the parameters identifiable, within the limits of the arm.
     #[command(after_help = CODES)]
     Design(DesignArgs),
-    /// Run a designed motion and then a slow one on the simulated arm, and log both.
+    /// Run a designed motion and then a slow one, on the simulated arm or with --plant on an arm or a system, and log both.
     #[command(after_help = CODES)]
     Run(RunArgs),
 }
@@ -292,9 +292,48 @@ pub struct DesignArgs {
     pub quiet: bool,
 }
 
+/// The arm that a command moves, on a system that it starts or that runs already.
+#[derive(Clone, Debug, Args)]
+pub struct MovedArmArgs {
+    /// Move this arm as a real one, instead of the simulated arm alone.
+    #[arg(long = "plant", value_enum)]
+    pub on: Option<CalibrationPlant>,
+    /// Model to start from: path of its TOML or folder. Default: the arm's own.
+    #[arg(long, value_name = "PATH", requires = "on")]
+    pub model: Option<PathBuf>,
+    /// Relative errors of the starting model in gravity, in friction and, if given, in rotor inertia, with the signs of
+    /// --seed, for example 0.15,0.5,1. For simulated arms.
+    #[arg(long, value_name = "GRAVITY,FRICTION[,INERTIA]", value_delimiter = ',', requires = "on", value_parser = between(0.0, 1.0))]
+    pub start_error: Vec<f64>,
+    /// Confirm that the space swept by the arm is free; the program does not ask.
+    #[arg(long, requires = "on")]
+    pub yes: bool,
+    /// The arm's bus, can:NAME or unix:FOLDER. Default: can:can0 for `can`, private sockets for `emu`.
+    #[arg(long, value_name = "BUS", requires = "on")]
+    pub bus: Option<String>,
+    /// Declare that the arm is in its home pose now; used if the motor pucks have lost their position reference.
+    #[arg(long, requires = "on")]
+    pub zero_at_home: bool,
+    /// Inject a fault into the simulated or emulated arm, as `supple up --inject`.
+    #[arg(long, value_name = "SPEC", requires = "on")]
+    pub inject: Vec<Injection>,
+    /// Run the processes in lockstep, as fast as possible: `emu` only.
+    #[arg(long, requires = "on")]
+    pub virtual_time: bool,
+    /// Prefix of the system. Default: SUPPLE_PREFIX or `supple`.
+    #[arg(long, value_name = "NAME", requires = "on")]
+    pub prefix: Option<String>,
+    /// Run without realtime priority, locked memory or processor binding.
+    #[arg(long, requires = "on")]
+    pub no_realtime: bool,
+}
+
 /// Arguments of `excite run`.
 #[derive(Clone, Debug, Args)]
 pub struct RunArgs {
+    /// The arm that moves.
+    #[command(flatten)]
+    pub moved: MovedArmArgs,
     /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF: plant and controller.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: String,
@@ -333,17 +372,34 @@ pub struct RunArgs {
 /// Arguments of `breakaway`.
 #[derive(Clone, Debug, Args)]
 pub struct BreakawayArgs {
-    /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF.
-    #[arg(long, value_name = "NAME|PATH", default_value = "wam4")]
-    pub arm: String,
+    /// The arm that moves.
+    #[command(flatten)]
+    pub moved: MovedArmArgs,
+    /// Folder for the logs of --plant and calibration.json.
+    #[arg(
+        long,
+        value_name = "DIR",
+        default_value = "out/breakaway",
+        requires = "on"
+    )]
+    pub out: PathBuf,
+    /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF. Default: the arm of the running system with
+    /// `--plant running`, else `wam4`.
+    #[arg(long, value_name = "NAME|PATH")]
+    pub arm: Option<String>,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
     #[arg(long)]
     pub strict: bool,
     /// What a URDF alone does not contain.
     #[command(flatten)]
     pub urdf: UrdfArgs,
-    /// Joints, counted from 0. Default: all.
-    #[arg(long, value_name = "J,J..", value_delimiter = ',')]
+    /// Joints, counted from 0. Default: all, as always with --plant.
+    #[arg(
+        long,
+        value_name = "J,J..",
+        value_delimiter = ',',
+        conflicts_with = "on"
+    )]
     pub joints: Vec<usize>,
     /// Seed of the initial model and of all noise.
     #[arg(long, value_name = "N", default_value_t = 0)]
@@ -378,19 +434,9 @@ pub enum CalibrationPlant {
 /// Arguments of `calibrate`.
 #[derive(Clone, Debug, Args)]
 pub struct CalibrateArgs {
-    /// Calibrate this arm step by step, as a real arm.
-    #[arg(long = "plant", value_enum)]
-    pub on: Option<CalibrationPlant>,
-    /// Model to start from: path of its TOML or folder. Default: the arm's own.
-    #[arg(long, value_name = "PATH", requires = "on")]
-    pub model: Option<PathBuf>,
-    /// Relative errors of the starting model in gravity, in friction and, if given, in rotor inertia, with the signs of
-    /// --seed, for example 0.15,0.5,1. For simulated arms.
-    #[arg(long, value_name = "GRAVITY,FRICTION[,INERTIA]", value_delimiter = ',', requires = "on", value_parser = between(0.0, 1.0))]
-    pub start_error: Vec<f64>,
-    /// Confirm that the space swept by the arm is free; the program does not ask.
-    #[arg(long, requires = "on")]
-    pub yes: bool,
+    /// The arm that moves.
+    #[command(flatten)]
+    pub moved: MovedArmArgs,
     /// Continue after the last finished step of the calibration in --out.
     #[arg(long, requires = "on")]
     pub resume: bool,
@@ -409,24 +455,6 @@ pub struct CalibrateArgs {
         value_parser = RangedU64ValueParser::<usize>::new().range(1..=MAX_CANDIDATES as u64)
     )]
     pub candidates: usize,
-    /// The arm's bus, can:NAME or unix:FOLDER. Default: can:can0 for `can`, private sockets for `emu`.
-    #[arg(long, value_name = "BUS", requires = "on")]
-    pub bus: Option<String>,
-    /// Declare that the arm is in its home pose now; used if the motor pucks have lost their position reference.
-    #[arg(long, requires = "on")]
-    pub zero_at_home: bool,
-    /// Inject a fault into the simulated or emulated arm, as `supple up --inject`.
-    #[arg(long, value_name = "SPEC", requires = "on")]
-    pub inject: Vec<Injection>,
-    /// Run the processes in lockstep, as fast as possible: `emu` only.
-    #[arg(long, requires = "on")]
-    pub virtual_time: bool,
-    /// Prefix of the system. Default: SUPPLE_PREFIX or `supple`.
-    #[arg(long, value_name = "NAME", requires = "on")]
-    pub prefix: Option<String>,
-    /// Run without realtime priority, locked memory or processor binding.
-    #[arg(long, requires = "on")]
-    pub no_realtime: bool,
     /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF: the simulated plant. Default: the arm of the
     /// running system with `running`, else `wam4`.
     #[arg(long, value_name = "NAME|PATH")]
@@ -494,10 +522,28 @@ pub struct CalibratePaperArgs {
 /// Arguments of `learn`.
 #[derive(Clone, Debug, Args)]
 pub struct LearnArgs {
-    /// Logs of the motion, supple's MCAP or CSV; the last periods are enough.
-    #[arg(required = true, value_name = "LOG")]
+    /// Logs of the motion, supple's MCAP or CSV; the last periods are enough. With --plant the arm tracks the sinusoid at 5 N/m,
+    /// which gives the log.
+    #[arg(
+        required_unless_present = "on",
+        conflicts_with = "on",
+        value_name = "LOG"
+    )]
     pub logs: Vec<PathBuf>,
-    /// The model that the controller used: a built-in arm, or the path of a TOML or of its folder.
+    /// The arm that moves.
+    #[command(flatten)]
+    pub moved: MovedArmArgs,
+    /// The simulated arm.
+    #[command(flatten)]
+    pub plant: PlantArgs,
+    /// Duration of the sinusoid (s).
+    #[arg(long = "for", value_name = "S", default_value_t = 24.0, requires = "on", value_parser = between(10.0, 3600.0))]
+    pub for_s: f64,
+    /// Seed of the effects of the simulated arm.
+    #[arg(long, value_name = "N", default_value_t = 0, requires = "on")]
+    pub seed: u64,
+    /// The model that the controller used: a built-in arm, or the path of a TOML or of its folder. With --plant the arm, whose
+    /// controller may use another --model.
     #[arg(long, value_name = "NAME|PATH")]
     pub arm: String,
     /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.

@@ -13,7 +13,7 @@ pub use effects::EffectsArgs;
 pub use identification::{
     BreakawayArgs, CalibrateArgs, CalibratePaperArgs, CalibrationPlant, Criterion, DesignArgs,
     EffectsArg, ExciteCommand, FrictionArg, IdentificationCommand, IdentifyArgs, LearnArgs,
-    RunArgs, Solver, TorqueDelay,
+    MovedArmArgs, RunArgs, Solver, TorqueDelay,
 };
 pub use log::{LogCommand, LogDataCommand, PlotArgs};
 pub use new::NewArgs;

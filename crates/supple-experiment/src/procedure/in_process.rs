@@ -153,7 +153,8 @@ impl<const N: usize> InProcessArm<N> {
                 if let Some(recorder) = &mut recorder {
                     recorder.write_cycle(&cycle)?;
                 }
-                if let Some(refusal) = output.refusal {
+                // Later refusals are of requests of the learner, which a change of mode may overtake.
+                if let (Some(refusal), 0) = (output.refusal, k) {
                     return Err(ProcedureError::from(ExperimentError::Refused {
                         experiment: name.to_owned(),
                         reason: in_words(&config, &refusal),

@@ -30,6 +30,15 @@ pub struct Sweep {
     pub paths_m: Vec<Vec<[f64; 3]>>,
 }
 
+fn share(i: usize) -> f64 {
+    i as f64 / POSES as f64
+}
+
+/// Returns the poses of a straight line in joint space.
+fn line<const N: usize>(from_rad: Vector<N>, to_rad: Vector<N>) -> impl Iterator<Item = Vector<N>> {
+    (0..=POSES).map(move |i| from_rad + (to_rad - from_rad) * share(i))
+}
+
 impl Sweep {
     /// Returns the space of these motions and of the moves between them in joint space.
     pub fn of<const N: usize>(
@@ -37,31 +46,64 @@ impl Sweep {
         from_rad: &Vector<N>,
         all: &[Fourier<N>],
     ) -> Sweep {
-        let mut sweep = Sweep {
-            lower_m: [f64::MAX; 3],
-            upper_m: [f64::MIN; 3],
-            lower_rad: vec![f64::MAX; N],
-            upper_rad: vec![f64::MIN; N],
-            paths_m: Vec::new(),
-        };
+        let mut sweep = Sweep::empty(N);
         let mut at_rad = *from_rad;
         for series in all {
             let start_rad = series.at(0.0).position_rad;
-            let step = |i: usize| i as f64 / POSES as f64;
-            let approach = (0..=POSES).map(|i| at_rad + (start_rad - at_rad) * step(i));
-            let along = (0..=POSES).map(|i| series.at(series.duration_s * step(i)).position_rad);
+            let along = (0..=POSES).map(|i| series.at(series.duration_s * share(i)).position_rad);
             let mut path = Vec::new();
-            for q in approach.chain(along) {
+            for q in line(at_rad, start_rad).chain(along) {
                 path.push(sweep.add(config, &q));
             }
             sweep.paths_m.push(path);
             at_rad = series.at(series.duration_s).position_rad;
         }
-        for axis in 0..3 {
-            sweep.lower_m[axis] -= THICKNESS_M;
-            sweep.upper_m[axis] += THICKNESS_M;
+        sweep.with_thickness()
+    }
+
+    /// Returns the space of a move in joint space, and then of this path of the tip \[m\] near its end.
+    pub fn of_tip_path<const N: usize>(
+        config: &Config<N>,
+        from_rad: &Vector<N>,
+        start_rad: &Vector<N>,
+        path_m: impl IntoIterator<Item = [f64; 3]>,
+    ) -> Sweep {
+        let mut sweep = Sweep::empty(N);
+        let mut path = Vec::new();
+        for q in line(*from_rad, *start_rad) {
+            path.push(sweep.add(config, &q));
         }
-        sweep
+        for point_m in path_m {
+            sweep.add_point(point_m);
+            path.push(point_m);
+        }
+        sweep.paths_m.push(path);
+        sweep.with_thickness()
+    }
+
+    fn empty(joints: usize) -> Sweep {
+        Sweep {
+            lower_m: [f64::MAX; 3],
+            upper_m: [f64::MIN; 3],
+            lower_rad: vec![f64::MAX; joints],
+            upper_rad: vec![f64::MIN; joints],
+            paths_m: Vec::new(),
+        }
+    }
+
+    fn with_thickness(mut self) -> Sweep {
+        for axis in 0..3 {
+            self.lower_m[axis] -= THICKNESS_M;
+            self.upper_m[axis] += THICKNESS_M;
+        }
+        self
+    }
+
+    fn add_point(&mut self, point_m: [f64; 3]) {
+        for (axis, value_m) in point_m.into_iter().enumerate() {
+            self.lower_m[axis] = self.lower_m[axis].min(value_m);
+            self.upper_m[axis] = self.upper_m[axis].max(value_m);
+        }
     }
 
     /// Returns whether the other space lies within this space.
@@ -76,10 +118,7 @@ impl Sweep {
         let tip_m: [f64; 3] = tip_pose(&config.arm, q).translation.into();
         let joints = joint_poses(&config.arm, q).map(|pose| pose.translation.into());
         for point in joints.into_iter().chain([tip_m]) {
-            for (axis, value_m) in point.into_iter().enumerate() {
-                self.lower_m[axis] = self.lower_m[axis].min(value_m);
-                self.upper_m[axis] = self.upper_m[axis].max(value_m);
-            }
+            self.add_point(point);
         }
         for joint in 0..N {
             self.lower_rad[joint] = self.lower_rad[joint].min(q[joint]);

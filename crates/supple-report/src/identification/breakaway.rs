@@ -3,7 +3,7 @@
 use super::requested_joints::requested_joints;
 use serde::Serialize;
 use supple_cli::arguments::BreakawayArgs;
-use supple_cli::arms;
+use supple_cli::arms::{self, DEFAULT_ARM};
 use supple_cli::console::{print_json, print_line};
 use supple_cli::exit::Failure;
 use supple_core::Vector;
@@ -29,7 +29,13 @@ pub struct Line {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &BreakawayArgs) -> Result<(), Failure> {
-    let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
+    if args.moved.on.is_some() {
+        return Err(Failure::NeedsSupple { option: "--plant" });
+    }
+    let arm = arms::find(
+        &args.urdf.name(args.arm.as_deref().unwrap_or(DEFAULT_ARM)),
+        args.strict,
+    )?;
     let joints = requested_joints(&args.joints, arm.dof())?;
     let effects = args.plant.options(&arm)?;
     let lines = with_dof!(arm.dof(), N => {

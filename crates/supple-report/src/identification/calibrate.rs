@@ -49,7 +49,7 @@ struct Summary {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &CalibrateArgs) -> Result<(), Failure> {
-    if args.on.is_some() {
+    if args.moved.on.is_some() {
         return Err(Failure::NeedsSupple { option: "--plant" });
     }
     let name = args.arm.as_deref().unwrap_or(DEFAULT_ARM);

@@ -33,6 +33,12 @@ struct Summary<'a> {
 /// # Errors
 /// [`Failure`].
 pub fn run(args: &LearnArgs) -> Result<(), Failure> {
+    if args.moved.on.is_some() {
+        return Err(Failure::NeedsSupple { option: "--plant" });
+    }
+    if args.plant.realistic || args.plant.plant_options.is_some() {
+        return Err(Failure::EffectsWithoutArm);
+    }
     let arm = arms::find(&args.urdf.name(&args.arm), args.strict)?;
     with_dof!(arm.dof(), N => run_with_dof::<N>(&arm, args))?
 }

@@ -1,6 +1,6 @@
 //! The motions, and the space that they sweep.
 
-use super::{FLOAT_S, GAINS_S, ModelStage, REST_S, RETURN_RAD, Run, config};
+use super::{FLOAT_S, GAINS_S, ModelStage, REST_S, Run, config};
 use crate::excite::move_to;
 use crate::procedure::arm::MotionArm;
 use crate::procedure::error::ProcedureError;
@@ -83,7 +83,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         self.report(&text);
         let confirmed = self.operator.confirms(sweep, &drawing);
         self.progress.sweep = Some(sweep.clone());
-        self.progress.write(&self.options.out)?;
+        self.write_progress()?;
         match confirmed {
             true => Ok(()),
             false => Err(ProcedureError::NotConfirmed { drawing }),
@@ -108,21 +108,26 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
 
     /// Returns the approximate time of all motion \[s\].
     pub(super) fn stated_s(&self, config: &Config<N>, motions: &Motions<N>) -> f64 {
+        let until_breakaway_s = self.options.warm_up_s + ramps_s(config) + REST_S;
+        let before_the_passes = [StepName::Confirmed, StepName::WarmUp, StepName::Breakaway];
+        if self
+            .options
+            .until
+            .is_some_and(|step| before_the_passes.contains(&step))
+        {
+            return until_breakaway_s;
+        }
         let all: f64 = follow(config, &self.home_rad, &motions.all(), None)
             .iter()
             .map(|step| step.duration_s)
             .sum();
         let (_, sinusoid_s) = self.start.paths().sinusoid(1.0);
         let first_rad = motions.first.at(0.0).position_rad;
-        let home_rad = &self.home_rad;
-        let return_s = move_to(config, home_rad, &home_rad.add_scalar(RETURN_RAD)).duration_s;
         let returns_s = 9.0 * move_to(config, &first_rad, &self.home_rad).duration_s;
-        all + self.options.warm_up_s
-            + ramps_s(config)
-            + REST_S
+        all + until_breakaway_s
             + returns_s
             + FLOAT_S
-            + 2.0 * (sinusoid_s + return_s + GAINS_S)
+            + 2.0 * (sinusoid_s + REST_S + GAINS_S)
             + LEARNING_S
     }
 }

@@ -3,6 +3,7 @@
 mod design;
 mod fits;
 mod passes;
+mod single;
 mod trials;
 mod wiring;
 
@@ -18,14 +19,14 @@ use supple_core::config::JointGains;
 use supple_core::{Config, Vector};
 use supple_model::Description;
 
-/// Duration of the rest in which the holding torque is measured \[s\].
+pub use single::{SingleMotion, excite_arm, track_arm};
+
+/// Duration of the rest in which the holding torque is measured, and of the rest after a sinusoid \[s\].
 const REST_S: f64 = 1.0;
 /// Duration of float \[s\].
 const FLOAT_S: f64 = 2.0;
 /// Duration of a change of gains \[s\].
 const GAINS_S: f64 = 0.2;
-/// Distance of each joint from the start of the sinusoid for which the time of the move back suffices \[rad\].
-const RETURN_RAD: f64 = 1.5;
 /// Maximum number of attempts at a motion that contact stops.
 const ATTEMPTS: usize = 3;
 
@@ -56,6 +57,9 @@ pub fn calibrate_arm<const N: usize, A: MotionArm<N>>(
 /// Stage of the calibration that determines the model in the controller.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum ModelStage {
+    /// The given model as it is.
+    Given,
+    /// The given model, with which all joints move.
     Start,
     First,
     Identified,
@@ -76,6 +80,8 @@ struct Run<'a, const N: usize, A> {
     light_rad: Option<Vector<N>>,
     /// Gains of the move mode with the model of the first pass; `None`: the gains of the description.
     first_gains: Option<JointGains<N>>,
+    /// Whether the progress is written to the folder of the results.
+    keeps_progress: bool,
 }
 
 /// A motion that was completed.
@@ -112,7 +118,16 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             loaded: None,
             light_rad: None,
             first_gains: None,
+            keeps_progress: true,
         })
+    }
+
+    /// Writes the progress to the folder of the results.
+    fn write_progress(&self) -> Result<(), ProcedureError> {
+        match self.keeps_progress {
+            true => self.progress.write(&self.options.out),
+            false => Ok(()),
+        }
     }
 
     fn all(mut self) -> Result<CalibratedArm, A::Error> {
@@ -195,6 +210,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
     fn model(&self, stage: ModelStage) -> Result<Description, ProcedureError> {
         let load = |folder: PathBuf| Description::load(folder.join("arm.toml"));
         Ok(match stage {
+            ModelStage::Given => self.start.clone(),
             ModelStage::Start => self.start.with_all_joints_active()?,
             ModelStage::First => load(self.options.out.join(FIRST_MODEL))?,
             ModelStage::Identified => load(self.options.out.clone())?,
@@ -214,7 +230,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             text_of(stage)
         ));
         let mut model = self.model(stage)?;
-        if stage != ModelStage::Identified {
+        if matches!(stage, ModelStage::Start | ModelStage::First) {
             let unknown = stage == ModelStage::Start || self.progress.first_fit.is_none();
             let mut minimum = minimum_thresholds::<N>(&model, unknown)?;
             if let (ModelStage::First, Some(gains)) = (stage, &self.first_gains) {
@@ -276,7 +292,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
                 (StopCause::Contact, false) => "clear the space that the arm sweeps",
                 (cause, _) => cause.remedy(),
             };
-            self.progress.write(&self.options.out)?;
+            self.write_progress()?;
             return Err(ProcedureError::Stopped {
                 motion: name.to_owned(),
                 fault,
@@ -303,7 +319,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             log,
             contacts,
         });
-        self.progress.write(&self.options.out)
+        self.write_progress()
     }
 
     /// Returns whether a step is finished; if not, reports its beginning to the operator.
@@ -322,6 +338,7 @@ fn config<const N: usize>(model: &Description) -> Result<Config<N>, ProcedureErr
 
 fn name_of(stage: ModelStage) -> &'static str {
     match stage {
+        ModelStage::Given => "given",
         ModelStage::Start => "start",
         ModelStage::First => "full-pass",
         ModelStage::Identified => "float",
@@ -330,7 +347,7 @@ fn name_of(stage: ModelStage) -> &'static str {
 
 fn text_of(stage: ModelStage) -> &'static str {
     match stage {
-        ModelStage::Start => "given model",
+        ModelStage::Given | ModelStage::Start => "given model",
         ModelStage::First => "model of the first pass",
         ModelStage::Identified => "identified model",
     }

@@ -1,6 +1,6 @@
 //! Trials of the identified model: float and sinusoid.
 
-use super::{FLOAT_S, GAINS_S, ModelStage, RETURN_RAD, Run, config};
+use super::{FLOAT_S, GAINS_S, ModelStage, REST_S, Run, config};
 use crate::error::ExperimentError;
 use crate::excite::move_to;
 use crate::metrics::Rms;
@@ -43,7 +43,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             Some(stopped) => {
                 self.report(&format!("float ended by a fault: {}", stopped.fault));
                 self.progress.float_ended = Some(stopped.fault);
-                self.progress.write(&self.options.out)?;
+                self.write_progress()?;
                 self.arm.recover()?;
             }
         }
@@ -97,12 +97,8 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
                 steps.push(Step::wait(on, GAINS_S));
             }
             steps.push(track(lead_s + duration_s));
-            // The sinusoid continues until the next request.
-            steps.push(move_to(
-                &self.limits,
-                &start_rad,
-                &start_rad.add_scalar(RETURN_RAD),
-            ));
+            // The sinusoid continues until the next request. The arm may be far from it.
+            steps.push(Step::wait(Request::GravityHold, REST_S));
             let performed = self.arm.perform(name, &steps)?;
             self.progress.moved_s += performed.moved_s;
             let motion = performed.motions.first();
@@ -111,7 +107,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
                 result.ended = Some(stopped.fault);
                 // Also kept if the arm cannot be held after the fault.
                 self.progress.sinusoid = Some(result.clone());
-                self.progress.write(&self.options.out)?;
+                self.write_progress()?;
                 self.arm.recover()?;
                 continue;
             }

@@ -1,0 +1,141 @@
+//! Single motions of an arm, without the other steps of a calibration.
+
+use super::{GAINS_S, ModelStage, REST_S, Run, config};
+use crate::excite::move_to;
+use crate::procedure::arm::MotionArm;
+use crate::procedure::error::ProcedureError;
+use crate::procedure::motions::follow;
+use crate::procedure::sweep::Sweep;
+use crate::procedure::{LOGS, Operator, ProcedureOptions};
+use crate::request_sequence::Step;
+use crate::scenario;
+use crate::start::start_pose;
+use serde::Serialize;
+use std::path::PathBuf;
+use supple_core::Vector;
+use supple_core::controller::Request;
+use supple_core::trajectory::Fourier;
+use supple_model::Description;
+
+/// Name of the log of an excitation.
+const EXCITATION: &str = "excitation";
+/// Name of the log of a tracked sinusoid.
+const SINUSOID: &str = "sinusoid";
+
+/// Number of points of the sinusoid in the drawing of the swept space.
+const PATH_SAMPLES: usize = 100;
+
+/// Result of a motion.
+#[derive(Clone, Debug, Serialize)]
+pub struct SingleMotion {
+    /// Name of the arm.
+    pub arm: String,
+    /// The log of the motion.
+    pub log: PathBuf,
+    /// Time in modes that move joints, of all motions \[s\].
+    pub moved_s: f64,
+    /// Faults by contact, after each of which the motion was repeated.
+    pub contacts: Vec<String>,
+}
+
+/// Moves an arm, whose model `start` may be wrong, along each series and back to its home pose. The operator confirms the swept space
+/// before. The log is `logs/excitation.mcap` in the folder of `options`.
+///
+/// # Errors
+/// [`ProcedureError`] with the remedy, and the errors of the arm.
+pub fn excite_arm<const N: usize, A: MotionArm<N>>(
+    arm: &mut A,
+    start: &Description,
+    series: &[Fourier<N>],
+    options: &ProcedureOptions,
+    operator: &mut dyn Operator,
+) -> Result<SingleMotion, A::Error> {
+    let run = Run::without_progress(arm, start, options, operator)?;
+    let limits = run.limits;
+    let steps = |from: &Vector<N>| follow(&limits, from, series, None);
+    let sweep = Sweep::of(&limits, &run.home_rad, series);
+    run.single(ModelStage::Start, EXCITATION, &sweep, &steps)
+}
+
+/// Tracks the sinusoid at 5 N/m with the model `start` for `duration_s` and moves back to the home pose. The operator confirms the
+/// swept space before. The log is `logs/sinusoid.mcap` in the folder of `options`.
+///
+/// # Errors
+/// As [`excite_arm`]; a sinusoid that the arm cannot reach.
+pub fn track_arm<const N: usize, A: MotionArm<N>>(
+    arm: &mut A,
+    start: &Description,
+    duration_s: f64,
+    options: &ProcedureOptions,
+    operator: &mut dyn Operator,
+) -> Result<SingleMotion, A::Error> {
+    let run = Run::without_progress(arm, start, options, operator)?;
+    let limits = run.limits;
+    let model = config::<N>(start)?;
+    let (trajectory, period_s) = start.paths().sinusoid(1.0);
+    let start_rad = start_pose(&model, SINUSOID, &trajectory, period_s);
+    let start_rad = start_rad.map_err(ProcedureError::from)?;
+    let gains = Request::Gains {
+        gains: scenario::gains(scenario::STIFFNESS_N_PER_M),
+        ramp_s: 0.5 * GAINS_S,
+    };
+    let steps = |from: &Vector<N>| {
+        vec![
+            move_to(&limits, &start_rad, from),
+            Step::wait(gains, GAINS_S),
+            Step {
+                recorded: true,
+                ..Step::wait(Request::Track(trajectory), duration_s)
+            },
+            Step::wait(Request::GravityHold, REST_S),
+        ]
+    };
+    let samples = (0..=PATH_SAMPLES).map(|i| period_s * i as f64 / PATH_SAMPLES as f64);
+    let path_m = samples.map(|t_s| trajectory.at(t_s).position.into());
+    let sweep = Sweep::of_tip_path(&model, &run.home_rad, &start_rad, path_m);
+    run.single(ModelStage::Given, SINUSOID, &sweep, &steps)
+}
+
+impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
+    fn without_progress(
+        arm: &'a mut A,
+        start: &'a Description,
+        options: &'a ProcedureOptions,
+        operator: &'a mut dyn Operator,
+    ) -> Result<Self, ProcedureError> {
+        let run = Run::new(arm, start, options, operator)?;
+        Ok(Run {
+            keeps_progress: false,
+            ..run
+        })
+    }
+
+    fn single(
+        mut self,
+        stage: ModelStage,
+        name: &str,
+        sweep: &Sweep,
+        steps: &dyn Fn(&Vector<N>) -> Vec<Step<N>>,
+    ) -> Result<SingleMotion, A::Error> {
+        let there: f64 = steps(&self.home_rad)
+            .iter()
+            .map(|step| step.duration_s)
+            .sum();
+        self.report(&format!("about {there:.0} s of motion follow"));
+        self.confirm_sweep(sweep)?;
+        self.ensure_model(stage)?;
+        self.report(name);
+        let done = self.motion(name, steps)?;
+        self.home("home")?;
+        Ok(SingleMotion {
+            arm: self.start.name().to_owned(),
+            log: self
+                .options
+                .out
+                .join(LOGS)
+                .join(format!("{}.mcap", done.log)),
+            moved_s: self.progress.moved_s,
+            contacts: done.contacts,
+        })
+    }
+}

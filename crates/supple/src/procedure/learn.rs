@@ -1,0 +1,74 @@
+//! `supple learn --plant ..`: an arm tracks the sinusoid at 5 N/m; the model is refitted to the log.
+
+use super::terminal::Terminal;
+use super::{MovedArm, Work, find};
+use std::os::unix::process::CommandExt;
+use std::process::Command;
+use supple_cli::arguments::{CalibrationPlant, LearnArgs};
+use supple_cli::exit::Failure;
+use supple_cli::sibling::program_beside;
+use supple_experiment::procedure::{self, MotionArm, ProcedureOptions, track_arm};
+use supple_model::{Description, with_dof};
+
+struct Track {
+    duration_s: f64,
+    options: ProcedureOptions,
+}
+
+impl<const N: usize> Work<N> for Track {
+    type Output = procedure::SingleMotion;
+
+    fn perform<A: MotionArm<N>>(
+        self,
+        arm: &mut A,
+        start: &Description,
+        operator: &mut Terminal,
+    ) -> Result<procedure::SingleMotion, A::Error> {
+        track_arm(arm, start, self.duration_s, &self.options, operator)
+    }
+}
+
+/// Runs `supple learn` with `--plant`: the process replaces itself with `supple-report`, which refits the model to the log. Returns only
+/// if the arm or this fails.
+///
+/// # Errors
+/// [`Failure`].
+pub fn learn(args: &LearnArgs, on: CalibrationPlant) -> Result<(), Failure> {
+    let arm = Some(args.arm.as_str());
+    let (domain, name, description) = find(on, &args.moved, arm, &args.urdf, args.strict)?;
+    let model = match &args.moved.model {
+        Some(model) => model.display().to_string(),
+        None => name.clone(),
+    };
+    let moved = MovedArm {
+        on,
+        args: &args.moved,
+        plant: &args.plant,
+        strict: args.strict,
+        out: &args.out,
+        seed: args.seed,
+        ripple_nm: 0.0,
+        load_friction: true,
+        json: args.json,
+        quiet: args.json,
+        name,
+        description,
+        domain,
+    };
+    let work = Track {
+        duration_s: args.for_s,
+        options: moved.options(),
+    };
+    let found = with_dof!(moved.description.dof(), N => moved.perform::<N, _>(work))??;
+    let program = program_beside(crate::REPORT)?;
+    let mut command = Command::new(&program);
+    command.arg("learn").arg(&found.log).args(["--arm", &model]);
+    command.arg("--out").arg(&args.out);
+    if let Some(kg) = args.payload {
+        command.arg("--payload").arg(kg.to_string());
+    }
+    if args.json {
+        command.arg("--json");
+    }
+    Err(Failure::file("start", &program, command.exec()))
+}
