@@ -7,11 +7,15 @@
 //! averaged over the samples in which the arm is near the poses and speeds of the sinusoid, and a joint slides, separately for
 //! both directions: noise averages out, errors of gravity and friction stay.
 //!
+//! A joint whose friction falls with speed by more than its damping holds against sticks and slips, also with an exact model: the
+//! difference of breakaway and Coulomb torque then counts as a residual too.
+//!
 //! The factor of the upper bound covers nine tenths of the calibrations of simulated arms with random effects
 //! of real arms (`docs/verdict.md`).
 
+use crate::scenario::{STIFFNESS_N_PER_M, gains};
 use crate::tracking_prediction::GOOD_M;
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Vector3};
 use serde::{Deserialize, Serialize};
 use supple_core::dynamics::jacobian;
 use supple_core::{Config, Vector};
@@ -34,6 +38,8 @@ const SLIDING_RAD: f64 = 0.03;
 /// Fraction of the force at the tip of all dry friction that the feed-forward leaves at reversals even with an exact model: 3 mm
 /// at 5 N/m on the WAM.
 const REVERSAL_SHARE: f64 = 0.004;
+/// Range of a joint's angles in the sinusoid below which it rests; friction then holds it where it is.
+const ASKED_RAD: f64 = 0.01;
 /// Upper and lower bound relative to the estimate; the error at reversals is added to the upper bound, as squares.
 const UPPER_FACTOR: f64 = 1.2;
 const LOWER_FACTOR: f64 = 0.1;
@@ -82,6 +88,8 @@ pub struct SinusoidRegion<const N: usize> {
     force_n_per_nm: Vec<f64>,
     /// Force at the tip that even an exact model leaves at reversals \[N\].
     reversal_n: f64,
+    /// Torque by which each active joint sticks and slips even with an exact model \[N m\], see [`sticking_nm`].
+    sticking_nm: Vec<f64>,
 }
 
 impl<const N: usize> SinusoidRegion<N> {
@@ -120,6 +128,10 @@ impl<const N: usize> SinusoidRegion<N> {
             .iter()
             .zip(&force_n_per_nm)
             .map(|(&joint, force)| force * config.friction[joint].coulomb_nm);
+        let sticking_nm = active
+            .iter()
+            .map(|&joint| sticking_nm(config, poses, joint));
+        let sticking_nm = sticking_nm.collect();
         let reversal_n = REVERSAL_SHARE * dry_n.map(|n| n * n).sum::<f64>().sqrt();
         Some(SinusoidRegion {
             lower_rad,
@@ -128,7 +140,15 @@ impl<const N: usize> SinusoidRegion<N> {
             active,
             force_n_per_nm,
             reversal_n,
+            sticking_nm,
         })
+    }
+
+    /// Returns the torque by which each joint that moves the tip sticks and slips in the sinusoid at 5 N/m with an exact model
+    /// \[N m\], with the index of the joint.
+    pub fn sticking_joints_nm(&self) -> impl Iterator<Item = (usize, f64)> {
+        let all = self.active.iter().copied().zip(self.sticking_nm.clone());
+        all.filter(|(_, torque_nm)| *torque_nm > 0.0)
     }
 
     /// Returns the squared distance of a sample from the region, in units of [`NEAR_RAD`] and [`NEAR_RAD_PER_S`].
@@ -142,6 +162,40 @@ impl<const N: usize> SinusoidRegion<N> {
             beyond(motion.qd[(sample, j)].abs(), 0.0, self.max_rad_per_s[j]) / NEAR_RAD_PER_S
         };
         (0..N).map(|j| angle(j).powi(2) + speed(j).powi(2)).sum()
+    }
+}
+
+/// Returns the torque by which a joint that is asked to move along these poses sticks and slips at 5 N/m: the difference of breakaway and
+/// Coulomb torque if, on average, dry friction falls with speed by more than viscous friction and the law's damping hold against,
+/// else zero. The feed-forward of friction follows the reference, so that it damps nothing.
+fn sticking_nm<const N: usize>(config: &Config<N>, poses: &[Vector<N>], joint: usize) -> f64 {
+    let friction = &config.friction[joint];
+    let excess_nm = friction.breakaway_nm - friction.coulomb_nm;
+    let angles = poses.iter().map(|q| q[joint]);
+    let (lower_rad, upper_rad) = angles.fold((f64::MAX, f64::MIN), |(lower, upper), angle| {
+        (lower.min(angle), upper.max(angle))
+    });
+    if upper_rad - lower_rad < ASKED_RAD {
+        return 0.0;
+    }
+    // The slope of exp(-x^2) is steepest here; a joint that is hardly asked to move gets there by itself.
+    let steepest = core::f64::consts::FRAC_1_SQRT_2;
+    let falls_nm_s_per_rad = |speed_rad_per_s: f64| {
+        let x = (speed_rad_per_s / friction.stribeck_rad_per_s).max(steepest);
+        excess_nm / friction.stribeck_rad_per_s * 2.0 * x * (-x * x).exp()
+    };
+    let law_n_s_per_m = gains(STIFFNESS_N_PER_M).damping_n_s_per_m;
+    let damping_nm_s_per_rad = |pair: &[Vector<N>]| {
+        let speed_rad_per_s = (pair[1][joint] - pair[0][joint]).abs() / REACH_CHECK_STEP_S;
+        let columns = jacobian(&config.arm, &pair[1]);
+        let column = Vector3::from_fn(|axis, _| columns[(axis, joint)]);
+        let of_law = column.dot(&law_n_s_per_m.component_mul(&column));
+        of_law + friction.viscous_nm_s_per_rad - falls_nm_s_per_rad(speed_rad_per_s)
+    };
+    let sum: f64 = poses.windows(2).map(damping_nm_s_per_rad).sum();
+    match sum < 0.0 {
+        true => excess_nm,
+        false => 0.0,
     }
 }
 
@@ -223,7 +277,7 @@ pub fn error_interval<const N: usize>(
         let mut parts = Vec::new();
         for (i, &row) in rows.iter().enumerate() {
             residual_nm[row] = found[i];
-            let force_n = found[i] * region.force_n_per_nm[i];
+            let force_n = found[i].hypot(region.sticking_nm[i]) * region.force_n_per_nm[i];
             parts.push((region.active[i], force_n * force_n));
         }
         let squares: f64 = parts.iter().map(|part| part.1).sum();

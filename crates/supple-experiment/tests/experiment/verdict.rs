@@ -2,12 +2,12 @@
 
 use nalgebra::DMatrix;
 use supple_core::dynamics::{jacobian, rnea};
-use supple_core::{Config, Vector};
+use supple_core::{Config, Friction, Vector};
 use supple_experiment::{
     SinusoidRegion, error_interval, error_interval_of, feedforward_residual_nm, start_pose,
 };
 use supple_ident::{ExcludedInterval, Motion};
-use supple_model::Description;
+use supple_model::{Description, IdentifiedModel};
 
 const RATE_HZ: f64 = 100.0;
 const STIFFNESS_N_PER_M: f64 = 5.0;
@@ -77,6 +77,50 @@ fn a_constant_torque_deflects_the_tip_by_its_force_over_the_stiffness() {
     let ratio = upper_m(&swinging(8.0), |_, _| 0.1) / deflection_m;
     // 1.2 times the estimate, whose force is the RMS over the path.
     assert!((1.1..1.4).contains(&ratio), "{ratio}");
+}
+
+/// Dry friction that falls with speed by more than the damping of the joint and of the law is a torque of its own, but not for a joint that
+/// the sinusoid does not move: friction holds it.
+#[test]
+fn a_joint_that_sticks_and_slips_has_an_interval_without_a_residual() {
+    let config = config();
+    let upper_m = |joint: usize, excess_nm: f64| {
+        let mut friction = config.friction;
+        friction[joint] = Friction {
+            breakaway_nm: 0.5 + excess_nm,
+            stribeck_rad_per_s: 0.2,
+            ..Friction::coulomb(0.1, 0.5)
+        };
+        let described = wam4().with_model(&IdentifiedModel {
+            arm: &config.arm,
+            friction: &friction,
+            ripple: None,
+            source: "a test",
+        });
+        let region = SinusoidRegion::<4>::new(&described.expect("an arm")).expect("four joints");
+        let region = region.expect("within reach");
+        let residuals = DMatrix::zeros(swinging(8.0).samples(), 4);
+        let motion = swinging(8.0);
+        let sticking: Vec<f64> = region.sticking_joints_nm().map(|(_, nm)| nm).collect();
+        let found = error_interval(
+            &region,
+            &MOVING,
+            &[(&motion, &residuals)],
+            STIFFNESS_N_PER_M,
+        );
+        (sticking, found.expect("every joint slides").upper_m)
+    };
+    let (none, exact_m) = upper_m(ELBOW, 0.0);
+    assert!(none.is_empty(), "{none:?}");
+    let (sticking, upper) = upper_m(ELBOW, 0.4);
+    assert!((sticking[0] - 0.4).abs() < 1e-9, "{sticking:?}");
+    let force_m = 0.4 * force_n_per_nm() / STIFFNESS_N_PER_M;
+    assert!((1.0..1.6).contains(&(upper / force_m)), "{upper} {force_m}");
+    // Enough damping for a smaller fall.
+    assert_eq!(upper_m(ELBOW, 0.02).0, Vec::<f64>::new());
+    let (resting, of_yaw_m) = upper_m(0, 0.4);
+    assert!(resting.is_empty(), "{resting:?}");
+    assert!(of_yaw_m < 2.0 * exact_m, "{of_yaw_m} {exact_m}");
 }
 
 #[test]
