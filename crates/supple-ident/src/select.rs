@@ -2,7 +2,7 @@
 //!
 //! The logs are divided into folds: with three logs of the same kind or more, whole logs, otherwise consecutive parts of each. Each
 //! fold is predicted from a fit to the others. Among the candidates that are at most a standard error worse than the best one, the
-//! one with the fewest columns is selected; among those with the same number of columns, the first of the list.
+//! one with the fewest columns is selected; among those, the one with the smallest rank; among those, the best one.
 
 use crate::columns::{Columns, FrictionColumns};
 use crate::effects::Effects;
@@ -56,6 +56,7 @@ pub fn friction_candidates(base: &Options) -> Vec<Candidate> {
             friction,
             ..base.clone()
         },
+        rank: 0,
     };
     shapes.into_iter().map(candidate).collect()
 }
@@ -75,8 +76,9 @@ pub fn load_candidates(base: &Options) -> Vec<Candidate> {
             },
             ..base.clone()
         },
+        rank: 0,
     };
-    [
+    let candidates = [
         ("independent of load", None),
         (
             "growing with the load of the joint",
@@ -85,7 +87,16 @@ pub fn load_candidates(base: &Options) -> Vec<Candidate> {
         ("growing with the motor's torque", Some(LoadTorque::Motor)),
     ]
     .map(candidate)
-    .to_vec()
+    .to_vec();
+    ranked(candidates)
+}
+
+/// Returns the candidates ranked in this order.
+fn ranked(mut candidates: Vec<Candidate>) -> Vec<Candidate> {
+    for (rank, candidate) in candidates.iter_mut().enumerate() {
+        candidate.rank = rank;
+    }
+    candidates
 }
 
 /// Widths of the band around standstill, the default first, with all other options as in `base`.
@@ -99,13 +110,15 @@ pub fn band_candidates(base: &Options) -> Vec<Candidate> {
             },
             ..base.clone()
         },
+        rank: 0,
     };
-    [0.01, 0.005, 0.015, 0.02, 0.03, 0.05, 0.1]
+    let candidates = [0.01, 0.005, 0.015, 0.02, 0.03, 0.05, 0.1]
         .map(candidate)
-        .to_vec()
+        .to_vec();
+    ranked(candidates)
 }
 
-/// Weightings of joints and samples, with all other options as in `base`.
+/// Weightings of joints and samples, the default first, with all other options as in `base`.
 pub fn weights_candidates(base: &Options) -> Vec<Candidate> {
     let candidate = |(name, weights): (&str, Weights)| Candidate {
         name: name.to_owned(),
@@ -113,14 +126,16 @@ pub fn weights_candidates(base: &Options) -> Vec<Candidate> {
             weights,
             ..base.clone()
         },
+        rank: 0,
     };
-    [
-        ("equal weights", Weights::Equal),
+    let candidates = [
         ("weights by joint", Weights::ByJointResidual),
         ("weights by joint, robust", Weights::Huber),
+        ("equal weights", Weights::Equal),
     ]
     .map(candidate)
-    .to_vec()
+    .to_vec();
+    ranked(candidates)
 }
 
 /// No effects besides friction, those of `effects` without compliance, and all of `effects`.
@@ -135,6 +150,7 @@ pub fn effects_candidates(base: &Options, effects: &Effects) -> Vec<Candidate> {
             effects,
             ..base.clone()
         },
+        rank: 0,
     };
     [
         ("friction alone", Effects::default()),
@@ -153,8 +169,9 @@ pub fn prior_candidates(base: &Options) -> Vec<Candidate> {
             consistent_prior_weight: Some(weight),
             ..base.clone()
         },
+        rank: 0,
     };
-    [1e4, 1e3, 1e2, 1e1, 1.0, 0.1].map(candidate).to_vec()
+    ranked([1e4, 1e3, 1e2, 1e1, 1.0, 0.1].map(candidate).to_vec())
 }
 
 /// Cross-validates the candidates: predicts each of `parts` consecutive parts of every motion from the others.
@@ -214,9 +231,11 @@ pub fn compare<const N: usize>(
         return Err(reason);
     }
     let within = |i: &usize| results[*i].is_as_good_as(&results[best]);
-    let chosen = (0..results.len())
-        .filter(within)
-        .min_by_key(|i| results[*i].columns);
+    let chosen = (0..results.len()).filter(within).min_by(|a, b| {
+        let (a, b) = (&results[*a], &results[*b]);
+        let rank = |of: &CandidateResult| (of.columns, of.candidate.rank);
+        rank(a).cmp(&rank(b)).then(a.total.total_cmp(&b.total))
+    });
     Ok(SelectionTable {
         chosen: chosen.unwrap_or(best),
         candidates: results,

@@ -3,6 +3,10 @@
 use crate::options::Options;
 use std::fmt;
 
+/// Relative difference of two errors below which it does not matter, even if it is the same in all folds: with a few folds, chance
+/// gives a richer model such an advantage in one of six selections.
+const TIE: f64 = 0.005;
+
 /// A named set of options.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
@@ -10,6 +14,8 @@ pub struct Candidate {
     pub name: String,
     /// The options.
     pub options: Options,
+    /// Of candidates with the same number of columns that predict equally well, the one with the smallest rank is chosen.
+    pub rank: usize,
 }
 
 /// Result of one candidate.
@@ -28,7 +34,7 @@ pub struct CandidateResult {
 
 impl CandidateResult {
     /// Returns whether this candidate predicts as well as `best` does: the mean difference of their squared errors is at most its
-    /// standard error over the folds.
+    /// standard error over the folds, or their errors differ by less than [`TIE`].
     pub fn is_as_good_as(&self, best: &CandidateResult) -> bool {
         let differences: Vec<f64> = self
             .folds
@@ -42,7 +48,7 @@ impl CandidateResult {
         }
         let mean = differences.iter().sum::<f64>() / n;
         let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        mean <= (variance / n).sqrt()
+        mean <= (variance / n).sqrt() || self.total <= best.total * (1.0 + TIE)
     }
 }
 

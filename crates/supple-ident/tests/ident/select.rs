@@ -124,6 +124,7 @@ fn logs_of_the_same_kind_are_held_out_whole() {
         let candidates = [Candidate {
             name: "one".to_owned(),
             options: base(),
+            rank: 0,
         }];
         let table = compare(&model, motions, &JOINTS, &candidates, 4).unwrap();
         table.candidates[0].folds.len()
@@ -135,16 +136,21 @@ fn logs_of_the_same_kind_are_held_out_whole() {
     assert_eq!(folds(&[a.clone(), b.clone(), c, a, b]), 4);
 }
 
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
 #[test]
 fn a_candidate_is_as_good_if_it_is_within_a_standard_error() {
     let result = |folds: &[f64]| CandidateResult {
         candidate: Candidate {
             name: String::new(),
             options: base(),
+            rank: 0,
         },
         columns: 1,
         folds: folds.iter().map(|square| square.sqrt()).collect(),
-        total: 0.0,
+        total: mean(folds).sqrt(),
     };
     let best = result(&[1.0, 2.0, 3.0, 4.0]);
     // Mean difference 0.1, standard error over the folds 0.06.
@@ -152,7 +158,12 @@ fn a_candidate_is_as_good_if_it_is_within_a_standard_error() {
     // Mean difference 0.1, standard error 0.2.
     assert!(result(&[1.5, 1.7, 3.1, 4.1]).is_as_good_as(&best));
     assert!(best.is_as_good_as(&best));
-    let failed = result(&[]);
+    // 0.3 % in all folds does not matter.
+    assert!(result(&[1.006, 2.012, 3.018, 4.024]).is_as_good_as(&best));
+    let failed = CandidateResult {
+        total: f64::INFINITY,
+        ..result(&[])
+    };
     assert!(!failed.is_as_good_as(&best));
 }
 
