@@ -3,6 +3,9 @@
 use crate::exit::Failure;
 use std::path::{Path, PathBuf};
 
+/// Program that runs the commands that draw figures.
+pub const REPORT: &str = "supple-report";
+
 /// Returns the path of a program in the folder of this program.
 ///
 /// # Errors

@@ -23,11 +23,8 @@ use std::os::unix::process::CommandExt;
 use std::process::ExitCode;
 use supple_cli::arguments::{ExciteCommand, IdentificationCommand, LogCommand, OfflineCommand};
 use supple_cli::exit::Failure;
-use supple_cli::sibling::program_beside;
+use supple_cli::sibling::{REPORT, program_beside};
 use supple_cli::{arms, console, interrupt, log};
-
-/// Program that runs the commands that draw figures.
-const REPORT: &str = "supple-report";
 
 /// Runs the program: parses its arguments and returns its exit code.
 pub fn run() -> ExitCode {
@@ -90,12 +87,12 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
 /// Runs an identification command with `--plant`; `None` without it.
 fn with_moved_arm(command: &IdentificationCommand) -> Option<Result<(), Failure>> {
     Some(match command {
-        IdentificationCommand::Calibrate(args) => procedure::calibrate(args, args.moved.on?),
-        IdentificationCommand::Breakaway(args) => procedure::breakaway(args, args.moved.on?),
+        IdentificationCommand::Calibrate(args) => procedure::calibrate::run(args, args.moved.on?),
+        IdentificationCommand::Breakaway(args) => procedure::breakaway::run(args, args.moved.on?),
         IdentificationCommand::Excite(ExciteCommand::Run(args)) => {
-            procedure::excite(args, args.moved.on?)
+            procedure::excite::run(args, args.moved.on?)
         }
-        IdentificationCommand::Learn(args) => procedure::learn(args, args.moved.on?),
+        IdentificationCommand::Learn(args) => procedure::learn::run(args, args.moved.on?),
         _ => return None,
     })
 }

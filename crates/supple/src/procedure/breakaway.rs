@@ -22,7 +22,7 @@ struct Line<'a> {
 ///
 /// # Errors
 /// [`Failure`].
-pub fn breakaway(args: &BreakawayArgs, on: CalibrationPlant) -> Result<(), Failure> {
+pub fn run(args: &BreakawayArgs, on: CalibrationPlant) -> Result<(), Failure> {
     let arm = args.arm.as_deref();
     let (domain, name, description) = find(on, &args.moved, arm, &args.urdf, args.strict)?;
     let moved = MovedArm {

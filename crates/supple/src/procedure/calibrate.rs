@@ -30,7 +30,7 @@ impl<const N: usize> Work<N> for Calibrate {
 ///
 /// # Errors
 /// [`Failure`]; the results of finished steps are kept, see `--resume`.
-pub fn calibrate(args: &CalibrateArgs, on: CalibrationPlant) -> Result<(), Failure> {
+pub fn run(args: &CalibrateArgs, on: CalibrationPlant) -> Result<(), Failure> {
     let arm = args.arm.as_deref();
     let (domain, name, description) = find(on, &args.moved, arm, &args.urdf, args.strict)?;
     let moved = MovedArm {

@@ -32,7 +32,7 @@ impl<const N: usize> Work<N> for Excite<N> {
 ///
 /// # Errors
 /// [`Failure`].
-pub fn excite(args: &RunArgs, on: CalibrationPlant) -> Result<(), Failure> {
+pub fn run(args: &RunArgs, on: CalibrationPlant) -> Result<(), Failure> {
     let arm = Some(args.arm.as_str());
     let (domain, name, description) = find(on, &args.moved, arm, &args.urdf, args.strict)?;
     let design = ExcitationDesign::read(&args.design)?;

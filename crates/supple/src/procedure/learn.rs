@@ -6,7 +6,7 @@ use std::os::unix::process::CommandExt;
 use std::process::Command;
 use supple_cli::arguments::{CalibrationPlant, LearnArgs};
 use supple_cli::exit::Failure;
-use supple_cli::sibling::program_beside;
+use supple_cli::sibling::{REPORT, program_beside};
 use supple_experiment::procedure::{self, MotionArm, ProcedureOptions, track_arm};
 use supple_model::{Description, with_dof};
 
@@ -33,7 +33,7 @@ impl<const N: usize> Work<N> for Track {
 ///
 /// # Errors
 /// [`Failure`].
-pub fn learn(args: &LearnArgs, on: CalibrationPlant) -> Result<(), Failure> {
+pub fn run(args: &LearnArgs, on: CalibrationPlant) -> Result<(), Failure> {
     let arm = Some(args.arm.as_str());
     let (domain, name, description) = find(on, &args.moved, arm, &args.urdf, args.strict)?;
     let model = match &args.moved.model {
@@ -60,7 +60,7 @@ pub fn learn(args: &LearnArgs, on: CalibrationPlant) -> Result<(), Failure> {
         options: moved.options(),
     };
     let found = with_dof!(moved.description.dof(), N => moved.perform::<N, _>(work))??;
-    let program = program_beside(crate::REPORT)?;
+    let program = program_beside(REPORT)?;
     let mut command = Command::new(&program);
     command.arg("learn").arg(&found.log).args(["--arm", &model]);
     command.arg("--out").arg(&args.out);

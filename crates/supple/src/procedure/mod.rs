@@ -2,18 +2,13 @@
 //!
 //! The steps are those of [`supple_experiment::procedure`]; this module starts the processes and sends requests to them.
 
-mod breakaway;
-mod calibrate;
-mod excite;
-mod learn;
+pub mod breakaway;
+pub mod calibrate;
+pub mod excite;
+pub mod learn;
 mod report;
 mod running_arm;
 mod terminal;
-
-pub use breakaway::breakaway;
-pub use calibrate::calibrate;
-pub use excite::excite;
-pub use learn::learn;
 
 use crate::cli::{PlantKind, UpArgs, UpTrajectory};
 use crate::operate::arm_of;

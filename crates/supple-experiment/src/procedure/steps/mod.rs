@@ -3,7 +3,7 @@
 mod design;
 mod fits;
 mod passes;
-mod single;
+pub mod single;
 mod trials;
 mod wiring;
 
@@ -18,8 +18,6 @@ use std::path::PathBuf;
 use supple_core::config::JointGains;
 use supple_core::{Config, Vector};
 use supple_model::Description;
-
-pub use single::{SingleMotion, excite_arm, track_arm};
 
 /// Duration of the rest in which the holding torque is measured, and of the rest after a sinusoid \[s\].
 const REST_S: f64 = 1.0;
