@@ -10,6 +10,7 @@ mod arrays;
 mod base;
 mod check;
 mod complete;
+mod dh;
 mod dynamics;
 mod errors;
 mod excite;
@@ -39,6 +40,8 @@ mod _native {
     use super::arm::{Arm, assets};
     #[pymodule_export]
     use super::base::base_parameters;
+    #[pymodule_export]
+    use super::dh::dh_to_urdf;
     #[pymodule_export]
     use super::excite::{design_excitation, excite};
     #[pymodule_export]

@@ -252,3 +252,47 @@ def test_a_simulation_needs_limits_of_torque_and_speed(tmp_path):
 def test_built_in_arms_can_be_simulated(name):
     run = supple.simulate(supple.Arm.load(name), "sinusoid", duration_s=0.2)
     assert run.ended is None
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_an_arm_from_a_denavit_hartenberg_table(convention, tmp_path):
+    def about(axis, angle):
+        c, s = np.cos(angle), np.sin(angle)
+        turned = {"x": [[1, 0, 0], [0, c, -s], [0, s, c]], "z": [[c, -s, 0], [s, c, 0], [0, 0, 1]]}
+        pose = np.eye(4)
+        pose[:3, :3] = turned[axis]
+        return pose
+
+    def along(x, z):
+        pose = np.eye(4)
+        pose[:3, 3] = [x, 0, z]
+        return pose
+
+    random = np.random.default_rng(4)
+    table, q = random.uniform(-1, 1, (5, 4)), random.uniform(-2, 2, 5)
+    pose = np.eye(4)
+    for (a, alpha, d, theta), angle in zip(table, q, strict=True):
+        steps = [about("z", theta + angle), along(0, d), along(a, 0), about("x", alpha)]
+        if convention == "modified":
+            steps = [about("x", alpha), along(a, 0), about("z", theta + angle), along(0, d)]
+        for step in steps:
+            pose = pose @ step
+    file = tmp_path / "arm.urdf"
+    file.write_text(supple.dh_to_urdf(table, convention, masses_kg=[1, 2, 3, 4, 5], name="five"))
+    arm = supple.Arm.from_urdf(file, tip="tool0")
+    assert arm.dof == 5
+    np.testing.assert_allclose(arm.tip_pose(q), pose, atol=1e-12)
+
+
+def test_wrong_denavit_hartenberg_tables_are_rejected():
+    row = [0.0, 0.0, 0.1, 0.0]
+    with pytest.raises(ValueError, match=r"table: expected shape \(N, 4\).*got \(2, 3\)"):
+        supple.dh_to_urdf(np.zeros((2, 3)), "standard")
+    with pytest.raises(ValueError, match="convention: expected 'standard' or 'modified', got 'craig'"):
+        supple.dh_to_urdf([row], "craig")
+    with pytest.raises(ValueError, match=r"masses_kg: expected shape \(1,\)"):
+        supple.dh_to_urdf([row], "standard", masses_kg=[1, 2])
+    with pytest.raises(ValueError, match="table: row 1, mass_kg: found 0"):
+        supple.dh_to_urdf([row], "standard", masses_kg=[0])
+    with pytest.raises(ValueError, match="table: row 1, a_m: found NaN"):
+        supple.dh_to_urdf([[np.nan, 0, 0, 0]], "modified")

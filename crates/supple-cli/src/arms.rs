@@ -7,10 +7,15 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Mutex;
-use supple_model::{Description, Paths, UrdfName, assets};
+use supple_model::{
+    Description, DhConvention, Paths, UrdfName, assets, dh_rows_of_csv, urdf_of_dh,
+};
 
 /// The arm of a command or a process that is given none.
 pub const DEFAULT_ARM: &str = "wam4";
+
+/// Maximum size of a Denavit-Hartenberg table \[bytes\].
+const MAX_TABLE_BYTES: u64 = 1 << 16;
 
 /// Warnings that have been printed.
 static PRINTED_WARNINGS: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
@@ -142,7 +147,42 @@ pub fn run(args: &ArmsArgs) -> Result<(), Failure> {
             all_joints_active,
             force,
         }) => copy(arm, folder, *all_joints_active, *force),
+        Some(ArmsCommand::FromDh {
+            table,
+            urdf,
+            convention,
+            force,
+        }) => from_dh(table, urdf, *convention, *force),
     }
+}
+
+fn from_dh(
+    table: &Path,
+    urdf: &Path,
+    convention: DhConvention,
+    force: bool,
+) -> Result<(), Failure> {
+    let text = supple_files::read_text(table, MAX_TABLE_BYTES)
+        .map_err(|error| Failure::file("read", table, error))?;
+    let of_table = |error| Failure::DhTable {
+        file: table.to_owned(),
+        error,
+    };
+    let rows = dh_rows_of_csv(&text).map_err(of_table)?;
+    let stem = urdf.file_stem().map(|stem| stem.to_string_lossy());
+    let written = urdf_of_dh(stem.as_deref().unwrap_or("arm"), convention, &rows);
+    let written = written.map_err(of_table)?;
+    if urdf.exists() && !force {
+        let path = urdf.to_owned();
+        return Err(Failure::Exists { path });
+    }
+    supple_files::write_atomic(urdf, written.as_bytes())
+        .map_err(|error| Failure::file("write", urdf, error))?;
+    print_line(&format!(
+        "{0}: {1} joints; use it with --arm {0} --tip tool0",
+        urdf.display(),
+        rows.len()
+    ))
 }
 
 fn copy(arm: &str, folder: &Path, all_joints_active: bool, force: bool) -> Result<(), Failure> {

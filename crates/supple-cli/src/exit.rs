@@ -24,7 +24,7 @@ use supple_experiment::procedure::ProcedureError;
 use supple_experiment::teaching::PointsError;
 use supple_ident::{IdentError, ReadError, SaveError};
 use supple_log::LogError;
-use supple_model::ModelError;
+use supple_model::{DhError, ModelError};
 use supple_plant::{InjectionError, PlantOptionsError};
 
 /// Table of the exit codes, printed at the end of `--help`.
@@ -61,6 +61,14 @@ pub enum Failure {
     /// The arm description is invalid.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// A Denavit-Hartenberg table is invalid.
+    #[error("{}: {error}", file.display())]
+    DhTable {
+        /// The file.
+        file: PathBuf,
+        /// The error.
+        error: DhError,
+    },
     /// An experiment could not be run.
     #[error(transparent)]
     Experiment(#[from] ExperimentError),
@@ -527,7 +535,7 @@ impl Failure {
     /// Exit code, see the table of the module.
     pub fn code(&self) -> u8 {
         match self {
-            Failure::UnknownArm { .. } | Failure::Model(_) => 3,
+            Failure::UnknownArm { .. } | Failure::Model(_) | Failure::DhTable { .. } => 3,
             Failure::Experiment(error) => experiment_code(error),
             Failure::Procedure(error) => procedure_code(error),
             Failure::NeedsSupple { .. } | Failure::VirtualTimeNeedsEmu => 2,
@@ -707,6 +715,13 @@ mod tests {
             (plant_file("base_tilt_rad = 9").into(), arm),
             (plant_file("tilt = 9").into(), arm),
             (Failure::Model(model()), arm),
+            (
+                Failure::DhTable {
+                    file: PathBuf::from("a.csv"),
+                    error: DhError::Rows { found: 0 },
+                },
+                arm,
+            ),
             (
                 Failure::UnknownArm {
                     found: text(),

@@ -11,6 +11,7 @@ input raises an exception that names argument, expected and actual shape or valu
 """
 
 from supple._base import BaseParameters, base_parameters
+from supple._dh import dh_to_urdf
 from supple._excite import Excitation, Recording, design_excitation, excite
 from supple._fit import Fit, Payload, Validation, Weighing
 from supple._identify import DataWarning, FrictionColumns, identify
@@ -51,6 +52,7 @@ __all__ = [
     "base_parameters",
     "connect",
     "design_excitation",
+    "dh_to_urdf",
     "excite",
     "identify",
     "learn",

@@ -19,6 +19,7 @@ __all__ = [
     "assets",
     "base_parameters",
     "design_excitation",
+    "dh_to_urdf",
     "excite",
     "identify",
     "learn",
@@ -912,6 +913,9 @@ def torque_scale(
     fit: Fit, logs: list[dict[str, Any]], known: dict[str, Any]
 ) -> list[float | None]:
     """Returns the ratio of true to logged torque of each moving joint; `None` if the known payload adds too little torque."""
+
+def dh_to_urdf(name: str, standard: bool, rows: list[list[float]], masses_kg: list[float] | None) -> str:
+    """Returns the text of a URDF; rows of ``a``, ``alpha``, ``d``, ``theta``."""
 
 def weigh(fit: Fit, logs: list[dict[str, Any]], mass_kg: float) -> dict[str, Any]:
     """Estimates torque scales and the place of a weight of known mass."""

@@ -25,6 +25,7 @@ pub use supple_plant::PlantArgs;
 use crate::exit::CODES;
 use clap::{Args, Subcommand};
 use std::path::PathBuf;
+use supple_model::DhConvention;
 
 /// Command that needs no running system.
 #[derive(Clone, Debug, Subcommand)]
@@ -77,6 +78,22 @@ pub enum ArmsCommand {
         #[arg(long)]
         all_joints_active: bool,
         /// Replace files of an existing arm.
+        #[arg(long)]
+        force: bool,
+    },
+    /// Write the URDF of an arm of which only a Denavit-Hartenberg table is known.
+    ///
+    /// The table is a CSV with a row for each revolute joint and the columns a_m, alpha_rad or alpha_deg, d_m, theta_rad or
+    /// theta_deg (where the joint's angle is zero) and, if known, mass_kg. Links without a mass are balls of 1 kg.
+    FromDh {
+        /// The table.
+        table: PathBuf,
+        /// The URDF to write, with the links base, link1 .. and tool0.
+        urdf: PathBuf,
+        /// Convention of the table; with the wrong one the arm is another arm.
+        #[arg(long, value_enum)]
+        convention: DhConvention,
+        /// Replace an existing file.
         #[arg(long)]
         force: bool,
     },

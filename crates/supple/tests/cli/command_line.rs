@@ -78,6 +78,36 @@ fn the_built_in_arms_are_listed() {
     assert_eq!(joints, expected.into());
 }
 
+/// A table becomes a URDF that loads as an arm; an error names file, row, column and value.
+#[test]
+fn a_denavit_hartenberg_table_becomes_an_arm() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = |name: &str| folder.path().join(name).display().to_string();
+    let (table, urdf) = (path("table.csv"), path("three.urdf"));
+    let text = "a_m,alpha_deg,d_m,theta_rad\n0,90,0.2,0\n0.5,0,0,0\n0.4,0,0,0\n";
+    std::fs::write(&table, text).expect("written");
+    let of_standard = ["arms", "from-dh", &table, &urdf, "--convention", "standard"];
+    let answer = run(&of_standard);
+    assert_eq!(answer.code, Some(0), "{}", answer.stderr);
+    let name = supple_model::UrdfName::parse(&format!("{urdf}#tool0")).expect("a URDF");
+    let urdf_text = std::fs::read_to_string(&urdf).expect("written");
+    let limited = supple_model::unlimited::with_default_limits(&urdf_text);
+    std::fs::write(&urdf, limited).expect("written");
+    let arm = supple_model::Description::from_urdf(&name).expect("an arm");
+    assert_eq!(arm.dof(), 3);
+
+    let again = run(&of_standard);
+    assert_ne!(again.code, Some(0), "an existing file stays");
+    std::fs::write(&table, text.replace("0.5", "x")).expect("written");
+    let wrong = run(&[&of_standard[..], &["--force"]].concat());
+    assert_eq!(wrong.code, Some(3), "{}", wrong.stderr);
+    for word in ["table.csv", "row 2", "a_m", "`x`"] {
+        assert!(wrong.stderr.contains(word), "{word}: {}", wrong.stderr);
+    }
+    let without = run(&["arms", "from-dh", &table, &urdf]);
+    assert_eq!(without.code, Some(2), "the convention is not guessed");
+}
+
 /// A copy can be loaded, equals the arm, and replaces existing files only with --force.
 #[test]
 fn an_arm_is_copied() {
