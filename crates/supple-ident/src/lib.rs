@@ -49,6 +49,7 @@ pub mod ripple;
 mod save;
 pub mod select;
 mod selection_result;
+mod spikes;
 mod stribeck;
 pub mod validate;
 pub mod weigh;

@@ -17,6 +17,7 @@ use crate::select::{
     prior_candidates, weights_candidates,
 };
 use crate::selection_result::SelectionResult;
+use crate::spikes::without_spikes;
 use supple_core::{Arm, Friction};
 
 /// Number of folds of the cross-validation.
@@ -180,6 +181,14 @@ impl Procedure {
         self.cancellation.check()?;
         let preparation = &self.preparation;
         let mut warnings = log.check_without_units(N, identified_joints, preparation.cutoff_hz)?;
+        let cleaned = without_spikes(log);
+        let log = match &cleaned {
+            Some((cleaned, spikes)) => {
+                warnings.extend(spikes.iter().cloned());
+                cleaned
+            }
+            None => log,
+        };
         let findings = check_log(
             nominal,
             log,
