@@ -103,11 +103,12 @@ impl Up {
         }
     }
 
-    /// Whether the system is active and its drives are idle: this is so after a stall, and not after a request of the operator.
+    /// Whether the system is active, its drives are idle, and answers were missed: this is so after a stall of the machine.
     fn has_stalled(&self) -> bool {
         let output = self.run(&["status", "--json"]);
         let status: Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
-        status["drives"] == "idle" && status["mode"] == "gravity_hold"
+        let missed = status["missed"].as_u64().unwrap_or(0);
+        status["drives"] == "idle" && status["mode"] == "gravity_hold" && missed > 0
     }
 
     pub fn run(&self, arguments: &[&str]) -> Output {

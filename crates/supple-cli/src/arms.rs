@@ -8,7 +8,8 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::sync::Mutex;
 use supple_model::{
-    Description, DhConvention, Paths, UrdfName, assets, dh_rows_of_csv, urdf_of_dh,
+    Description, DhConvention, Paths, UrdfName, assets, dh_rows_of_csv,
+    unlimited::with_default_limits, urdf_of_dh,
 };
 
 /// The arm of a command or a process that is given none.
@@ -176,10 +177,12 @@ fn from_dh(
         let path = urdf.to_owned();
         return Err(Failure::Exists { path });
     }
+    let written = with_default_limits(&written);
     supple_files::write_atomic(urdf, written.as_bytes())
         .map_err(|error| Failure::file("write", urdf, error))?;
     print_line(&format!(
-        "{0}: {1} joints; use it with --arm {0} --tip tool0",
+        "{0}: {1} joints; for `identify` use it with --arm {0} --tip tool0. Its limits are placeholders: replace them before a controller \
+         uses it",
         urdf.display(),
         rows.len()
     ))

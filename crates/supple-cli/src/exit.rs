@@ -85,12 +85,12 @@ pub enum Failure {
     #[error("--virtual-time loads models with the plant `emu` only: use that, or leave it out")]
     VirtualTimeNeedsEmu,
     /// The operator or a signal interrupted a calibration, whose logs are complete.
-    #[error("interrupted; all logs are complete, continue with --resume")]
+    #[error("interrupted; all logs are complete, a calibration continues with --resume")]
     Interrupted,
     /// Another operator requested a mode during a calibration, whose logs are complete.
     #[error(
-        "another operator requested mode {mode}: the calibration has ended and sends no further requests; all logs are complete, \
-         continue with --resume"
+        "another operator requested mode {mode}: this command has ended and sends no further requests; all logs are complete, \
+         a calibration continues with --resume"
     )]
     OtherMode {
         /// Name of the mode.
@@ -99,7 +99,7 @@ pub enum Failure {
     /// The drives did not become active.
     #[error(
         "the drives did not become active: release the emergency stop, press Shift-Idle and then Shift-Activate on the \
-         pendant, and continue with --resume"
+         pendant, and start again (a calibration continues with --resume)"
     )]
     DrivesNotActive,
     /// The running system needs another model.
@@ -269,6 +269,28 @@ pub enum Failure {
          --plant sim"
     )]
     HandNeedsMode,
+    /// A model was given for a running system.
+    #[error(
+        "a running system keeps its model: start it with `supple up --arm {0}`, and leave --model out", model.display()
+    )]
+    ModelOfRunningSystem {
+        /// The given model.
+        model: PathBuf,
+    },
+    /// Effects that only the arm in this process has.
+    #[error(
+        "--ripple and --no-load-friction change the arm of --plant in-process: give other simulated arms --plant-options, and leave \
+         these options out"
+    )]
+    EffectsOfInProcess,
+    /// The folder of the results has a calibration that has gone further.
+    #[error(
+        "{} has a calibration that has gone further, which would be lost: give another --out", file.display()
+    )]
+    CalibrationWouldBeLost {
+        /// The file of the calibration.
+        file: PathBuf,
+    },
     /// Effects of a simulated arm were given with logs.
     #[error(
         "--realistic and --plant-options are effects of a simulated arm, which a log does not need: leave them out, or give \
@@ -562,7 +584,10 @@ impl Failure {
             Failure::OptionsOfRealArm
             | Failure::MisbehaviourWithoutMotors
             | Failure::NoDrivesForArm { .. } => 2,
-            Failure::EffectsWithoutArm => 2,
+            Failure::EffectsWithoutArm
+            | Failure::ModelOfRunningSystem { .. }
+            | Failure::EffectsOfInProcess
+            | Failure::CalibrationWouldBeLost { .. } => 2,
             Failure::HandNeedsMode | Failure::NoBus { .. } | Failure::NoSuchEffect { .. } => 2,
             Failure::PlantOptions(error) => plant_options_code(error),
             Failure::NoSuchProcess { .. } | Failure::NoSuchTestCase { .. } => 2,
@@ -704,6 +729,19 @@ mod tests {
             (Failure::FaultTestOnRealArm, "invalid command line"),
             (Failure::NoSuchProcess { name: "" }, "invalid command line"),
             (Failure::EffectsWithoutArm, "invalid command line"),
+            (Failure::EffectsOfInProcess, "invalid command line"),
+            (
+                Failure::ModelOfRunningSystem {
+                    model: PathBuf::from("a"),
+                },
+                "invalid command line",
+            ),
+            (
+                Failure::CalibrationWouldBeLost {
+                    file: PathBuf::from("a"),
+                },
+                "invalid command line",
+            ),
             (Failure::OptionsOfRealArm, "invalid command line"),
             (Failure::NoBus { option: "" }, "invalid command line"),
             (Failure::MisbehaviourWithoutMotors, "invalid command line"),

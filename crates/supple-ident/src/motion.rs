@@ -7,6 +7,7 @@
 use crate::error::{IdentError, Warning, positive, shape_error};
 use crate::filter::{LowPass, differentiate};
 use crate::log::Log;
+use crate::spikes::without_spikes;
 use nalgebra::DMatrix;
 
 /// Length of the filter's transient at an end, in periods of its cutoff: its slowest pole pair decays to 1 %.
@@ -104,7 +105,7 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// Checks `log` for an arm of `dof` joints, of which `identified_joints` are identified, and prepares it.
+    /// Checks `log` for an arm of `dof` joints, of which `identified_joints` are identified, replaces its spikes, and prepares it.
     ///
     /// # Errors
     /// A log that [`Log::check`] rejects; an option out of range; too few samples to filter.
@@ -114,8 +115,12 @@ impl Motion {
         identified_joints: &[usize],
         preparation: &Preparation,
     ) -> Result<(Motion, Vec<Warning>), IdentError> {
-        let warnings = log.check_with_cutoff(dof, identified_joints, preparation.cutoff_hz)?;
-        Ok((Self::from_checked_log(log, preparation)?, warnings))
+        let mut warnings = log.check_with_cutoff(dof, identified_joints, preparation.cutoff_hz)?;
+        let Some((cleaned, spikes)) = without_spikes(log) else {
+            return Ok((Self::from_checked_log(log, preparation)?, warnings));
+        };
+        warnings.extend(spikes);
+        Ok((Self::from_checked_log(&cleaned, preparation)?, warnings))
     }
 
     /// Does the same as [`Motion::prepare`], from a log that has been checked already.

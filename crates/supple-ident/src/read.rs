@@ -44,8 +44,8 @@ pub enum ReadError {
     },
 }
 
-/// Reads the usable intervals of a file: MCAP if its extension is `.mcap`, otherwise CSV. If an MCAP contains an excitation, its
-/// moves between poses are left out, because they hardly move some joints and are not suited for validation.
+/// Reads the usable intervals of a file: MCAP if its extension is `.mcap`, otherwise CSV. If an MCAP contains an excitation or a tracked
+/// path, its moves between poses are left out, because they hardly move some joints and are not suited for validation.
 ///
 /// # Errors
 /// [`ReadError`]; an MCAP of an arm with another number of joints.
@@ -54,7 +54,7 @@ pub fn read_logs<const N: usize>(path: &Path) -> Result<Vec<Log>, ReadError> {
         let free_motion_intervals = free_motion_intervals::<N>(path)?;
         let excites = free_motion_intervals
             .iter()
-            .any(|(mode, _)| *mode == Mode::Excite);
+            .any(|(mode, _)| matches!(mode, Mode::Excite | Mode::Track));
         let kept = free_motion_intervals
             .into_iter()
             .filter(|(mode, _)| !excites || *mode != Mode::Move);

@@ -1,7 +1,7 @@
 //! Removes spikes: one to three samples of a column far from those before and after them, as lost bits of a bus or a bad contact of an
 //! encoder write them. A filter would smear each of them over its period.
 //!
-//! A spike differs from the line through its neighbours by [`FAR`] times the greatest difference of two samples nearby, so that
+//! A spike differs from the line through its neighbours by [`FAR`] times the third greatest difference of two samples on either side, so that
 //! noise, contact and fast motion, which change several samples, are none; it is replaced by that line.
 
 use crate::error::Warning;
@@ -53,7 +53,12 @@ pub(crate) fn without_spikes(log: &Log) -> Option<(Log, Vec<Warning>)> {
 /// Replaces the spikes of a column; returns the first sample and the distance from the line of each.
 fn repair(matrix: &mut DMatrix<f64>, joint: usize) -> Vec<(usize, f64)> {
     let values: Vec<f64> = matrix.column(joint).iter().copied().collect();
-    let least = MIN_SHARE * range_without_extremes(&values);
+    let range = range_without_extremes(&values);
+    // A joint at rest changes by the resolution of its encoder.
+    if range == 0.0 {
+        return Vec::new();
+    }
+    let least = MIN_SHARE * range;
     let mut found = Vec::new();
     let mut at = 1;
     while at + 1 < values.len() {
@@ -95,9 +100,12 @@ fn spike(values: &[f64], first: usize, samples: usize, least: f64) -> Option<f64
         sign = off.signum();
         distance = distance.min(off.abs());
     }
+    // The two greatest differences of a side may be those of another spike.
     let differences = |range: &[f64]| {
         let pairs = range.windows(2).map(|pair| (pair[1] - pair[0]).abs());
-        pairs.fold(0.0, f64::max)
+        let mut all: Vec<f64> = pairs.collect();
+        all.sort_by(|a, b| b.total_cmp(a));
+        all.get(2).or(all.first()).copied().unwrap_or(0.0)
     };
     let across = (values[after] - values[first - 1]).abs();
     let nearby = differences(&values[first.saturating_sub(NEARBY)..first])
@@ -142,6 +150,7 @@ mod tests {
         let clean = log(|_, _| 0.0);
         let spiked = log(|i, j| match (i, j) {
             (300, 0) => 40.0,
+            (304, 0) => 38.0,
             (900..=902, 1) => -15.0,
             (1500, 1) => 5.0,
             _ => 0.0,
@@ -151,7 +160,7 @@ mod tests {
         let text: Vec<String> = warnings.iter().map(Warning::to_string).collect();
         assert_eq!(text.len(), 2, "{text:?}");
         assert!(
-            text[0].contains("tau[0]: has 1 spike") && text[0].contains("0.600 s"),
+            text[0].contains("tau[0]: has 2 spikes") && text[0].contains("0.600 s"),
             "{text:?}"
         );
         assert!(text[1].contains("tau[1]: has 2 spikes"), "{text:?}");
@@ -172,5 +181,10 @@ mod tests {
         // A torque that rests and steps by its resolution.
         let steps = |i: usize, _| if i % 400 == 0 { 0.2 } else { 0.0 };
         assert!(without_spikes(&log(steps)).is_none());
+        // A joint at rest whose encoder shows another count for a sample.
+        let mut resting = log(|_, _| 0.0);
+        resting.q_rad.column_mut(1).fill(0.5);
+        resting.q_rad[(800, 1)] += 1e-4;
+        assert!(without_spikes(&resting).is_none());
     }
 }

@@ -65,6 +65,24 @@ pub enum DhError {
         /// The column.
         found: String,
     },
+    /// A column is given twice, or in two units.
+    #[error("the header has the column {column} twice, or in two units: leave one of them out")]
+    Twice {
+        /// The column.
+        column: String,
+    },
+    /// A row has another number of cells than the header.
+    #[error(
+        "row {row} has {found} cells, the header {expected}: separate cells by commas, and decimals by points"
+    )]
+    Cells {
+        /// Number of the row, from 1, without the header.
+        row: usize,
+        /// Cells found.
+        found: usize,
+        /// Cells of the header.
+        expected: usize,
+    },
     /// A cell is not a number within its bounds.
     #[error(
         "row {row}, {column}: found {found}, must be a number of at most 1000 in magnitude{more}"
@@ -118,6 +136,14 @@ pub fn dh_rows_of_csv(text: &str) -> Result<Vec<DhRow>, DhError> {
         let found = (*found).to_owned();
         return Err(DhError::UnknownColumn { found });
     }
+    for (i, name) in header.iter().enumerate() {
+        let twice = |other: &str| header[..i].contains(&other);
+        let other_unit = name.replace("_rad", "_deg");
+        if twice(name) || name.ends_with("_rad") && header.contains(&other_unit.as_str()) {
+            let column = (*name).to_owned();
+            return Err(DhError::Twice { column });
+        }
+    }
     let place = |name: &str| header.iter().position(|column| *column == name);
     let needed = |column: &'static str| place(column).ok_or(DhError::NoColumn { column });
     let angle = |rad: &'static str, deg: &'static str| match (place(rad), place(deg)) {
@@ -133,6 +159,13 @@ pub fn dh_rows_of_csv(text: &str) -> Result<Vec<DhRow>, DhError> {
     let mass = place("mass_kg").map(|column| ("mass_kg", column, 1.0));
     let row = |(i, line): (usize, &str)| {
         let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+        if cells.len() != header.len() {
+            return Err(DhError::Cells {
+                row: i + 1,
+                found: cells.len(),
+                expected: header.len(),
+            });
+        }
         let number = |(column, place, unit): (&'static str, usize, f64)| {
             let text = cells.get(place).copied().unwrap_or("");
             let value = text
@@ -215,10 +248,11 @@ pub fn urdf_of_dh(name: &str, convention: DhConvention, rows: &[DhRow]) -> Resul
             0 => ("base".to_owned(), 1),
             _ => (format!("link{i}"), i + 1),
         };
+        let [x, y, z] = after.1.into();
         let inertia = 0.4 * mass_kg * BALL_M * BALL_M;
         let _ = write!(
             text,
-            "  <link name=\"link{link}\">\n    <inertial>\n      <mass value=\"{mass_kg:?}\"/>\n      <inertia ixx=\"{inertia:?}\" \
+            "  <link name=\"link{link}\">\n    <inertial>\n      <origin xyz=\"{x:?} {y:?} {z:?}\"/>\n      <mass value=\"{mass_kg:?}\"/>\n      <inertia ixx=\"{inertia:?}\" \
              ixy=\"0\" ixz=\"0\" iyy=\"{inertia:?}\" iyz=\"0\" izz=\"{inertia:?}\"/>\n    </inertial>\n  </link>\n  <joint \
              name=\"joint{link}\" type=\"revolute\">\n    {}\n    <parent link=\"{parent}\"/>\n    <child link=\"link{link}\"/>\n    \
              <axis xyz=\"0 0 1\"/>\n  </joint>\n",
@@ -270,7 +304,7 @@ mod tests {
     use crate::{Description, unlimited::with_default_limits};
     use nalgebra::{Isometry3, Translation3, UnitQuaternion};
     use supple_core::Vector;
-    use supple_core::dynamics::tip_pose;
+    use supple_core::dynamics::{gravity, tip_pose};
     use supple_random::Random;
 
     /// The definition of both conventions, written out.
@@ -324,6 +358,46 @@ mod tests {
         }
     }
 
+    /// A mass lies at the origin of the frame after its row, in both conventions.
+    #[test]
+    fn masses_lie_at_the_origins_of_the_frames() {
+        let row = |a_m, alpha_rad, mass_kg| DhRow {
+            a_m,
+            alpha_rad,
+            mass_kg: Some(mass_kg),
+            ..DhRow::default()
+        };
+        // The first axis is horizontal in both: the arm reaches 0.5 m and 0.9 m to the side.
+        let half = std::f64::consts::FRAC_PI_2;
+        let massless = 1e-9;
+        let standard = [
+            row(0.0, half, massless),
+            row(0.5, 0.0, 2.0),
+            row(0.4, 0.0, 3.0),
+        ];
+        let modified = [
+            row(0.0, half, massless),
+            row(0.5, 0.0, 2.0),
+            row(0.4, 0.0, 3.0),
+        ];
+        let torque_nm = |convention, rows: &[DhRow]| {
+            let urdf = urdf_of_dh("a", convention, rows).expect("a table");
+            let toml = "name = \"a\"\nurdf = \"a.urdf\"\ntip_frame = \"tool0\"\n";
+            let arm = Description::from_text(toml, &with_default_limits(&urdf)).expect("a URDF");
+            gravity(&arm.arm::<3>().expect("three joints"), &Vector::zeros())
+        };
+        let standard = torque_nm(DhConvention::Standard, &standard);
+        assert!(
+            (standard[1] - 9.81 * (2.0 * 0.5 + 3.0 * 0.9)).abs() < 1e-6,
+            "{standard}"
+        );
+        let modified = torque_nm(DhConvention::Modified, &modified);
+        assert!(
+            (modified[0] - 9.81 * (2.0 * 0.5 + 3.0 * 0.9)).abs() < 1e-6,
+            "{modified}"
+        );
+    }
+
     #[test]
     fn a_table_in_csv_is_read_and_errors_name_row_column_and_value() {
         let text = "# UR10e\na_m, alpha_deg, d_m, theta_deg, mass_kg\n0, 90, 0.1807, 0, 7.4\n-0.6127, 0, 0, 0, 13\n";
@@ -339,7 +413,16 @@ mod tests {
                 "a_m,alpha_rad,d_m,theta_rad\n0,0,0,0\n0,x,0,0\n",
                 "row 2, alpha_rad: found `x`",
             ),
-            ("a_m,alpha_rad,d_m,theta_rad\n0,0\n", "row 1, d_m: found ``"),
+            (
+                "a_m,alpha_rad,d_m,theta_rad\n0,0\n",
+                "row 1 has 2 cells, the header 4",
+            ),
+            (
+                "a_m,alpha_rad,d_m,theta_rad\n0,5,0,0,2,0\n",
+                "row 1 has 6 cells",
+            ),
+            ("a_m,alpha_rad,alpha_deg,d_m,theta_rad\n", "alpha_rad twice"),
+            ("a_m,alpha_rad,d_m,d_m,theta_rad\n", "d_m twice"),
             (
                 "a_m,alpha_rad,d_m,theta_rad\n0,0,NaN,0\n",
                 "row 1, d_m: found `NaN`",

@@ -405,7 +405,7 @@ pub struct BreakawayArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub seed: u64,
     /// Torque ripple of the plant's motors, seen at the joints (N m). It is identified first from slow runs, then
-    /// compensated.
+    /// compensated; with --plant in-process it is not.
     #[arg(long, value_name = "NM", default_value_t = 0.0, value_parser = between(0.0, 100.0))]
     pub ripple: f64,
     /// The simulated arm.

@@ -10,7 +10,7 @@ pub enum ProcedureError {
     #[error(transparent)]
     Experiment(#[from] ExperimentError),
     /// The motors, encoders and joints do not belong together as the description states.
-    #[error("{problem}: {remedy}; then continue with --resume")]
+    #[error("{problem}: {remedy}; then start again (a calibration continues with --resume)")]
     Wiring {
         /// Finding, with the joint.
         problem: String,
@@ -19,7 +19,7 @@ pub enum ProcedureError {
     },
     /// The operator did not confirm the space that the arm sweeps.
     #[error(
-        "the motion was not confirmed: look at {}, clear that space, and start again with --resume --yes",
+        "the motion was not confirmed: look at {}, clear that space, and start again with --yes (a calibration with --resume --yes)",
         drawing.display()
     )]
     NotConfirmed {
@@ -27,7 +27,9 @@ pub enum ProcedureError {
         drawing: PathBuf,
     },
     /// A fault stopped a motion, and repeating the motion is not safe or did not help.
-    #[error("{motion}: stopped by a fault: {fault}; {remedy}, then continue with --resume")]
+    #[error(
+        "{motion}: stopped by a fault: {fault}; {remedy}, then start again (a calibration continues with --resume)"
+    )]
     Stopped {
         /// Name of the motion.
         motion: String,

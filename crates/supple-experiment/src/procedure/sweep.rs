@@ -61,24 +61,54 @@ impl Sweep {
         sweep.with_thickness()
     }
 
-    /// Returns the space of a move in joint space, and then of this path of the tip \[m\] near its end.
-    pub fn of_tip_path<const N: usize>(
+    /// Returns the space as [`Sweep::of`] does, with the move to `end_rad` after the motions.
+    pub fn of_motions<const N: usize>(
         config: &Config<N>,
         from_rad: &Vector<N>,
-        start_rad: &Vector<N>,
-        path_m: impl IntoIterator<Item = [f64; 3]>,
+        all: &[Fourier<N>],
+        end_rad: &Vector<N>,
+    ) -> Sweep {
+        let last = all.last();
+        let last_rad = last.map_or(*from_rad, |series| {
+            series.at(series.duration_s).position_rad
+        });
+        let end = Sweep::of_poses(config, &last_rad, &[], end_rad);
+        Sweep::of(config, from_rad, all).with(end)
+    }
+
+    /// Returns the space of straight moves in joint space from one pose to the next.
+    pub fn of_poses<const N: usize>(
+        config: &Config<N>,
+        from_rad: &Vector<N>,
+        poses: &[Vector<N>],
+        end_rad: &Vector<N>,
     ) -> Sweep {
         let mut sweep = Sweep::empty(N);
         let mut path = Vec::new();
-        for q in line(*from_rad, *start_rad) {
+        let start_rad = poses.first().unwrap_or(end_rad);
+        let last_rad = poses.last().unwrap_or(end_rad);
+        let there = line(*from_rad, *start_rad);
+        for q in there
+            .chain(poses.iter().copied())
+            .chain(line(*last_rad, *end_rad))
+        {
             path.push(sweep.add(config, &q));
-        }
-        for point_m in path_m {
-            sweep.add_point(point_m);
-            path.push(point_m);
         }
         sweep.paths_m.push(path);
         sweep.with_thickness()
+    }
+
+    fn with(mut self, other: Sweep) -> Sweep {
+        for axis in 0..3 {
+            self.lower_m[axis] = self.lower_m[axis].min(other.lower_m[axis]);
+            self.upper_m[axis] = self.upper_m[axis].max(other.upper_m[axis]);
+        }
+        for joint in 0..self.lower_rad.len() {
+            self.lower_rad[joint] = self.lower_rad[joint].min(other.lower_rad[joint]);
+            self.upper_rad[joint] = self.upper_rad[joint].max(other.upper_rad[joint]);
+        }
+        self.paths_m.extend(other.paths_m);
+        self
     }
 
     fn empty(joints: usize) -> Sweep {

@@ -3,10 +3,11 @@
 use super::calibrate::Calibrate;
 use super::{MovedArm, find};
 use serde::Serialize;
+use std::path::Path;
 use supple_cli::arguments::{BreakawayArgs, CalibrationPlant};
 use supple_cli::console::{print_json, print_line};
 use supple_cli::exit::Failure;
-use supple_experiment::procedure::{ProcedureOptions, StepName};
+use supple_experiment::procedure::{FILE, ProcedureOptions, StepName};
 use supple_model::with_dof;
 
 #[derive(Serialize)]
@@ -16,6 +17,16 @@ struct Line<'a> {
     breakaway_nm: f64,
     /// Half the difference of both directions: gravity that the model lacks, or a torque offset \[N m\].
     offset_nm: f64,
+}
+
+/// Returns whether the file is that of a calibration beyond its breakaway torques.
+fn is_further(file: &Path) -> bool {
+    let text = std::fs::read_to_string(file).unwrap_or_default();
+    let progress: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
+    let finished = progress["finished"]
+        .as_array()
+        .map_or(&[][..], Vec::as_slice);
+    finished.iter().any(|step| step["step"] == "first_pass")
 }
 
 /// Runs `supple breakaway` with `--plant`: the steps of a calibration up to the breakaway torques.
@@ -44,6 +55,10 @@ pub fn run(args: &BreakawayArgs, on: CalibrationPlant) -> Result<(), Failure> {
         until: Some(StepName::Breakaway),
         ..moved.options()
     };
+    let file = args.out.join(FILE);
+    if is_further(&file) {
+        return Err(Failure::CalibrationWouldBeLost { file });
+    }
     let work = Calibrate { options };
     let found = with_dof!(moved.description.dof(), N => moved.perform::<N, _>(work))??;
     let names = found.description.joint_names();

@@ -5,7 +5,9 @@ use super::{MovedArm, Work, find, report};
 use supple_cli::arguments::{CalibrateArgs, CalibrationPlant};
 use supple_cli::console::print_status;
 use supple_cli::exit::Failure;
-use supple_experiment::procedure::{CalibratedArm, MotionArm, ProcedureOptions, calibrate_arm};
+use supple_experiment::procedure::{
+    self, CalibratedArm, MotionArm, ProcedureOptions, calibrate_arm,
+};
 use supple_model::{Description, with_dof};
 
 /// All steps of a calibration, or those up to a given one.
@@ -57,7 +59,7 @@ pub fn run(args: &CalibrateArgs, on: CalibrationPlant) -> Result<(), Failure> {
     };
     let work = Calibrate { options };
     let found = with_dof!(moved.description.dof(), N => moved.perform::<N, _>(work))?;
-    if found.is_err() && on != CalibrationPlant::InProcess {
+    if found.is_err() && args.out.join(procedure::FILE).exists() {
         print_status(&format!(
             "the results of the finished steps are in {}; --resume continues after them",
             args.out.display()

@@ -3,7 +3,7 @@
 use super::terminal::Terminal;
 use super::{MovedArm, Work, find};
 use supple_cli::arguments::{CalibrationPlant, RunArgs};
-use supple_cli::console::{print_json, print_line};
+use supple_cli::console::{json, print_line};
 use supple_cli::excitation_design::ExcitationDesign;
 use supple_cli::exit::Failure;
 use supple_core::trajectory::Fourier;
@@ -58,8 +58,11 @@ pub fn run(args: &RunArgs, on: CalibrationPlant) -> Result<(), Failure> {
         };
         moved.perform::<N, _>(work)
     })??;
+    let (file, text) = (args.out.join("summary.json"), json(&found)?);
+    supple_files::write_atomic(&file, format!("{text}\n").as_bytes())
+        .map_err(|error| Failure::file("write", &file, error))?;
     if args.json {
-        return print_json(&found);
+        return print_line(&text);
     }
     print_line(&format!(
         "{}: {:.1} minutes of motion; {}",

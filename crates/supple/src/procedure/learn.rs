@@ -10,21 +10,25 @@ use supple_cli::sibling::{REPORT, program_beside};
 use supple_experiment::procedure::{self, MotionArm, ProcedureOptions, track_arm};
 use supple_model::{Description, with_dof};
 
+/// Folder of the model that the controller used, in the folder of the results.
+const START: &str = "start";
+
 struct Track {
     duration_s: f64,
     options: ProcedureOptions,
 }
 
 impl<const N: usize> Work<N> for Track {
-    type Output = procedure::SingleMotion;
+    type Output = (procedure::SingleMotion, Description);
 
     fn perform<A: MotionArm<N>>(
         self,
         arm: &mut A,
         start: &Description,
         operator: &mut Terminal,
-    ) -> Result<procedure::SingleMotion, A::Error> {
-        track_arm(arm, start, self.duration_s, &self.options, operator)
+    ) -> Result<Self::Output, A::Error> {
+        let motion = track_arm(arm, start, self.duration_s, &self.options, operator)?;
+        Ok((motion, start.clone()))
     }
 }
 
@@ -36,10 +40,6 @@ impl<const N: usize> Work<N> for Track {
 pub fn run(args: &LearnArgs, on: CalibrationPlant) -> Result<(), Failure> {
     let arm = Some(args.arm.as_str());
     let (domain, name, description) = find(on, &args.moved, arm, &args.urdf, args.strict)?;
-    let model = match &args.moved.model {
-        Some(model) => model.display().to_string(),
-        None => name.clone(),
-    };
     let moved = MovedArm {
         on,
         args: &args.moved,
@@ -59,11 +59,17 @@ pub fn run(args: &LearnArgs, on: CalibrationPlant) -> Result<(), Failure> {
         duration_s: args.for_s,
         options: moved.options(),
     };
-    let found = with_dof!(moved.description.dof(), N => moved.perform::<N, _>(work))??;
+    let (found, start) = with_dof!(moved.description.dof(), N => moved.perform::<N, _>(work))??;
+    let model = args.out.join(START);
+    start.save(&model)?;
     let program = program_beside(REPORT)?;
     let mut command = Command::new(&program);
-    command.arg("learn").arg(&found.log).args(["--arm", &model]);
+    command.arg("learn").arg(&found.log);
+    command.arg("--arm").arg(model.join("arm.toml"));
     command.arg("--out").arg(&args.out);
+    if let Some(last_s) = args.last {
+        command.arg("--last").arg(last_s.to_string());
+    }
     if let Some(kg) = args.payload {
         command.arg("--payload").arg(kg.to_string());
     }

@@ -96,6 +96,10 @@ impl MovedArm<'_> {
 
     /// Performs the work in this process, or with a system of processes.
     fn perform<const N: usize, W: Work<N>>(&self, work: W) -> Result<W::Output, Failure> {
+        let of_process = self.on != CalibrationPlant::InProcess;
+        if of_process && (self.ripple_nm > 0.0 || !self.load_friction) {
+            return Err(Failure::EffectsOfInProcess);
+        }
         let logs = self.out.join(LOGS);
         std::fs::create_dir_all(&logs).map_err(|error| Failure::file("create", &logs, error))?;
         let (arm, on) = (&self.description, self.on);
@@ -136,6 +140,10 @@ impl MovedArm<'_> {
     /// Returns the model from which the procedure starts: `--model`, or the arm itself, with the errors of `--start-error`.
     fn start_model<const N: usize>(&self) -> Result<Description, Failure> {
         let model = match &self.args.model {
+            Some(model) if self.on == CalibrationPlant::Running => {
+                let model = model.clone();
+                return Err(Failure::ModelOfRunningSystem { model });
+            }
             Some(path) => arms::find(&path.display().to_string(), self.strict)?,
             None => self.description.clone(),
         };

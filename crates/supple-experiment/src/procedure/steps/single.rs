@@ -15,15 +15,12 @@ use std::path::PathBuf;
 use supple_core::Vector;
 use supple_core::controller::Request;
 use supple_core::trajectory::Fourier;
-use supple_model::Description;
+use supple_model::{Description, reach};
 
 /// Name of the log of an excitation.
 const EXCITATION: &str = "excitation";
 /// Name of the log of a tracked sinusoid.
 const SINUSOID: &str = "sinusoid";
-
-/// Number of points of the sinusoid in the drawing of the swept space.
-const PATH_SAMPLES: usize = 100;
 
 /// Result of a motion.
 #[derive(Clone, Debug, Serialize)]
@@ -52,8 +49,9 @@ pub fn excite_arm<const N: usize, A: MotionArm<N>>(
 ) -> Result<SingleMotion, A::Error> {
     let run = Run::without_progress(arm, start, options, operator)?;
     let limits = run.limits;
+    let home_rad = run.home_rad;
     let steps = |from: &Vector<N>| follow(&limits, from, series, None);
-    let sweep = Sweep::of(&limits, &run.home_rad, series);
+    let sweep = |from: &Vector<N>| Sweep::of_motions(&limits, from, series, &home_rad);
     run.single(ModelStage::Start, EXCITATION, &sweep, &steps)
 }
 
@@ -90,9 +88,11 @@ pub fn track_arm<const N: usize, A: MotionArm<N>>(
             Step::wait(Request::GravityHold, REST_S),
         ]
     };
-    let samples = (0..=PATH_SAMPLES).map(|i| period_s * i as f64 / PATH_SAMPLES as f64);
-    let path_m = samples.map(|t_s| trajectory.at(t_s).position.into());
-    let sweep = Sweep::of_tip_path(&model, &run.home_rad, &start_rad, path_m);
+    let poses = reach::follow(&model, &start_rad, &trajectory, period_s);
+    // The start pose has been searched so that the arm can follow.
+    let poses = poses.unwrap_or_else(|_| vec![start_rad]);
+    let home_rad = run.home_rad;
+    let sweep = |from: &Vector<N>| Sweep::of_poses(&model, from, &poses, &home_rad);
     run.single(ModelStage::Given, SINUSOID, &sweep, &steps)
 }
 
@@ -114,16 +114,14 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         mut self,
         stage: ModelStage,
         name: &str,
-        sweep: &Sweep,
+        sweep: &dyn Fn(&Vector<N>) -> Sweep,
         steps: &dyn Fn(&Vector<N>) -> Vec<Step<N>>,
     ) -> Result<SingleMotion, A::Error> {
-        let there: f64 = steps(&self.home_rad)
-            .iter()
-            .map(|step| step.duration_s)
-            .sum();
-        self.report(&format!("about {there:.0} s of motion follow"));
-        self.confirm_sweep(sweep)?;
         self.ensure_model(stage)?;
+        let from_rad = self.arm.position_rad()?;
+        let duration_s: f64 = steps(&from_rad).iter().map(|step| step.duration_s).sum();
+        self.report(&format!("about {duration_s:.0} s of motion follow"));
+        self.confirm_sweep(&sweep(&from_rad))?;
         self.report(name);
         let done = self.motion(name, steps)?;
         self.home("home")?;
