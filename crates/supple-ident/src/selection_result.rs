@@ -34,7 +34,7 @@ pub struct CandidateResult {
 
 impl CandidateResult {
     /// Returns whether this candidate predicts as well as `best` does: the mean difference of their squared errors is at most its
-    /// standard error over the folds, or their errors differ by less than [`TIE`].
+    /// standard error over the folds, or their errors differ by less than half a percent.
     pub fn is_as_good_as(&self, best: &CandidateResult) -> bool {
         let differences: Vec<f64> = self
             .folds

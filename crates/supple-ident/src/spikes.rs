@@ -177,9 +177,11 @@ mod tests {
         let push = |i: usize, _| if (700..740).contains(&i) { 60.0 } else { 0.0 };
         assert!(without_spikes(&log(push)).is_none());
         // Every tenth sample: a property of the signal.
-        assert!(without_spikes(&log(|i, _| if i % 10 == 0 { 50.0 } else { 0.0 })).is_none());
+        assert!(
+            without_spikes(&log(|i, _| if i.is_multiple_of(10) { 50.0 } else { 0.0 })).is_none()
+        );
         // A torque that rests and steps by its resolution.
-        let steps = |i: usize, _| if i % 400 == 0 { 0.2 } else { 0.0 };
+        let steps = |i: usize, _| if i.is_multiple_of(400) { 0.2 } else { 0.0 };
         assert!(without_spikes(&log(steps)).is_none());
         // A joint at rest whose encoder shows another count for a sample.
         let mut resting = log(|_, _| 0.0);
