@@ -1,4 +1,4 @@
-//! Curves of an identification: two quantities over time, one panel per joint.
+//! Curves of an identification: two quantities over time, angle or speed, one panel per joint.
 
 use super::axis::Axis;
 use super::canvas::draw_canvas;
@@ -23,23 +23,23 @@ pub struct Curves {
     pub second: (&'static str, Vec<(f64, f64)>),
 }
 
-/// Draws the figure as SVG.
+/// Draws the figure as SVG; `horizontal` is the label of the horizontal axes.
 ///
 /// # Errors
 /// [`FigureError::Draw`].
-pub fn curves(alt_text: &str, panels: &[Curves]) -> Result<String, FigureError> {
+pub fn curves(alt_text: &str, horizontal: &str, panels: &[Curves]) -> Result<String, FigureError> {
     let (width, height) = SIZE_PX;
     let count = panels.len().max(1) as u32;
     draw_canvas((width, height * count), alt_text, |area| {
         for (curves, area) in panels.iter().zip(area.split_evenly((panels.len(), 1))) {
             let all = || curves.first.1.iter().chain(&curves.second.1);
-            let time = extent(all().map(|point| point.0));
+            let across = extent(all().map(|point| point.0));
             let value = extent(all().map(|point| point.1));
             let mut panel = Panel::new(
                 &area,
                 &curves.title,
                 Margins::default(),
-                &Axis::new("time [s]", Ticks::around(time, 8)),
+                &Axis::new(horizontal, Ticks::around(across, 8)),
                 &Axis::new(curves.unit, Ticks::around(value, 4)),
             )?;
             panel.line(curves.first.1.iter().copied(), REFERENCE, 3.0)?;

@@ -11,8 +11,8 @@ use supple_cli::exit::Failure;
 use supple_cli::out::Staging;
 use supple_experiment::calibrate::{described_plant, plant_of};
 use supple_experiment::{
-    Calibration, IdentifiedModelTracking, ModelAccuracy, calibrate, predict_tracking_error,
-    track_with_identified_model,
+    Calibration, ExperimentError, IdentifiedModelTracking, ModelAccuracy, calibrate,
+    predict_tracking_error, track_with_identified_model,
 };
 use supple_model::{Description, with_dof};
 use supple_plant::PlantOptions;
@@ -135,8 +135,11 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &CalibrateArgs) -> Resu
         without_load = followed.map_err(&mut failed).ok();
     }
     let predicted_tracking = predict_tracking_error(&found.description, &found.fit, DRAWS)?;
+    let given = calibration.start.apply(&arm.config::<N>()?);
+    let given = given.map_err(ExperimentError::from)?;
     let report = ReportInput {
         arm: &found.description,
+        given_friction: given.friction.to_vec(),
         fit: &found.fit,
         logs: vec!["excitation".to_owned()],
         held_out: vec![(

@@ -179,6 +179,7 @@ fn figure<const N: usize>(
         .collect();
     Ok(curves(
         "Angle and speed of each joint of the excitation",
+        "time [s]",
         &panels,
     )?)
 }

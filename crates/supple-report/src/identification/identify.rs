@@ -200,6 +200,7 @@ fn run_with_dof<const N: usize>(arm: &Description, args: &IdentifyArgs) -> Resul
     steps.begin("trial runs: the sinusoid at 5 N/m with models drawn from the fit's uncertainty");
     let input = ReportInput {
         arm: &identified,
+        given_friction: arm.friction().to_vec(),
         fit: &fit,
         logs: args
             .logs

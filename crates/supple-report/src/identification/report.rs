@@ -5,6 +5,7 @@ use crate::figures::identification::{Curves, curves};
 use askama::Template;
 use serde::Serialize;
 use supple_cli::exit::Failure;
+use supple_core::Friction;
 use supple_experiment::scenario::STIFFNESS_N_PER_M;
 use supple_experiment::{ErrorInterval, NO_INTERVAL, TrackingPrediction, error_interval_of};
 use supple_ident::{DMatrix, Fit, Motion, Validation};
@@ -84,14 +85,12 @@ pub struct LinkChange {
 pub struct ResidualOverAngle {
     /// Name of the joint.
     pub joint: String,
-    /// Minimum angle, as text \[rad\].
-    pub from_rad: String,
-    /// Maximum angle, as text \[rad\].
-    pub to_rad: String,
-    /// Mean residual in each twelfth of the range while the angle increases \[N m\], as text.
-    pub forward: String,
-    /// Mean residual in each twelfth of the range while the angle decreases \[N m\], as text.
-    pub backward: String,
+    /// Middle of each twelfth of the joint's range \[rad\].
+    pub angle_rad: Vec<f64>,
+    /// Mean residual there while the angle increases \[N m\]; none without a sample.
+    pub forward_nm: Vec<Option<f64>>,
+    /// Mean residual there while the angle decreases \[N m\]; none without a sample.
+    pub backward_nm: Vec<Option<f64>>,
 }
 
 /// Prediction of one log.
@@ -120,6 +119,14 @@ pub struct JointFriction {
     pub breakaway_nm: f64,
     /// Offset.
     pub offset_nm: f64,
+    /// `v_s`, the speed over which friction falls from `S_0` to `S` \[rad/s\].
+    pub stribeck_rad_per_s: f64,
+    /// Dry friction for each newton metre of load.
+    pub load_coefficient: f64,
+    /// Travel over which friction reverses after a reversal \[rad\].
+    pub presliding_rad: f64,
+    /// `V`, `S`, `S_0` and offset of the given arm, units as above.
+    pub given: [f64; 4],
 }
 
 /// One base parameter.
@@ -137,6 +144,8 @@ pub struct BaseParameter {
 pub struct ReportInput<'a, const N: usize> {
     /// The identified arm.
     pub arm: &'a Description,
+    /// Friction of the given model, joint by joint.
+    pub given_friction: Vec<Friction>,
     /// The fit.
     pub fit: &'a Fit<N>,
     /// Names of the fitted logs.
@@ -209,6 +218,10 @@ pub fn summary<const N: usize>(input: &ReportInput<'_, N>) -> Summary {
                 coulomb_nm: friction[j].coulomb_nm,
                 breakaway_nm: friction[j].breakaway_nm,
                 offset_nm: friction[j].offset_nm,
+                stribeck_rad_per_s: friction[j].stribeck_rad_per_s,
+                load_coefficient: friction[j].load_coefficient,
+                presliding_rad: friction[j].presliding_rad,
+                given: given_friction(input, j),
             })
             .collect(),
         base: base.collect(),
@@ -229,6 +242,18 @@ pub fn summary<const N: usize>(input: &ReportInput<'_, N>) -> Summary {
         foretold: input.predicted_tracking.clone(),
         weighing: input.weighing.clone(),
     }
+}
+
+fn given_friction<const N: usize>(input: &ReportInput<'_, N>, joint: usize) -> [f64; 4] {
+    let of = input.given_friction.get(joint);
+    of.map_or([0.0; 4], |of| {
+        [
+            of.viscous_nm_s_per_rad,
+            of.coulomb_nm,
+            of.breakaway_nm,
+            of.offset_nm,
+        ]
+    })
 }
 
 /// Describes the result of the trial runs.
@@ -288,19 +313,16 @@ fn over_angle<const N: usize>(
             sum.0 += 1.0;
             sum.1 += motion.tau[(i, joint)] - predicted[(i, row)];
         }
-        let text = |cells: &[(f64, f64); CELLS]| {
-            let means = cells.iter().map(|(n, sum)| match *n > 0.0 {
-                true => format!("{:+.2}", sum / n),
-                false => "-".to_owned(),
-            });
-            means.collect::<Vec<_>>().join(" ")
+        let means = |cells: &[(f64, f64); CELLS]| {
+            let mean = |(n, sum): &(f64, f64)| (*n > 0.0).then(|| sum / n);
+            cells.iter().map(mean).collect()
         };
+        let middle = |cell: usize| low + (high - low) * (cell as f64 + 0.5) / CELLS as f64;
         ResidualOverAngle {
             joint: names[joint].clone(),
-            from_rad: format!("{low:.2}"),
-            to_rad: format!("{high:.2}"),
-            forward: text(&sums[1]),
-            backward: text(&sums[0]),
+            angle_rad: (0..CELLS).map(middle).collect(),
+            forward_nm: means(&sums[1]),
+            backward_nm: means(&sums[0]),
         }
     };
     input
@@ -340,6 +362,8 @@ struct Page<'a> {
     summary: &'a Summary,
     version: &'static str,
     figures: Vec<(String, String, String)>,
+    friction: String,
+    over_angle: String,
 }
 
 /// Renders the HTML report.
@@ -359,9 +383,74 @@ pub fn html<const N: usize>(
         summary,
         version: env!("CARGO_PKG_VERSION"),
         figures,
+        friction: friction_curves(input)?,
+        over_angle: over_angle_curves(summary)?,
     };
     page.render()
         .map_err(|error| Failure::ReportGeneration(error.to_string()))
+}
+
+/// Greatest speed of the friction curves of a joint that does not move in the held-out logs \[rad/s\].
+const CURVE_RAD_PER_S: f64 = 0.5;
+/// Number of speeds of a friction curve.
+const CURVE_POINTS: usize = 400;
+
+/// Draws the friction of each identified joint over its speed in the held-out logs, without load: given and identified.
+fn friction_curves<const N: usize>(input: &ReportInput<'_, N>) -> Result<String, Failure> {
+    let found = input.fit.friction_with(input.arm.friction());
+    let of_joint = |joint: &usize| {
+        let (joint, given) = (*joint, input.given_friction.get(*joint).copied());
+        let speeds = input
+            .held_out
+            .iter()
+            .map(|(_, motion, _)| motion.qd.column(joint).amax());
+        let greatest = match speeds.fold(0.0, f64::max) {
+            0.0 => CURVE_RAD_PER_S,
+            greatest => greatest,
+        };
+        let points = |friction: Friction| {
+            let speed = |i: usize| greatest * (2.0 * i as f64 / CURVE_POINTS as f64 - 1.0);
+            let point = |i| (speed(i), friction.torque_nm(speed(i)));
+            (0..=CURVE_POINTS).map(point).collect()
+        };
+        Curves {
+            title: input.arm.joint_names()[joint].clone(),
+            unit: "friction [N m]",
+            first: ("given", points(given.unwrap_or(Friction::NONE))),
+            second: ("identified", points(found[joint])),
+        }
+    };
+    let joints = input.fit.columns.identified_joints();
+    let panels: Vec<Curves> = joints.iter().map(of_joint).collect();
+    Ok(curves(
+        "Friction of each joint over its speed, given and identified",
+        "speed [rad/s]",
+        &panels,
+    )?)
+}
+
+/// Draws the mean residual of each joint over its angle, in both directions.
+fn over_angle_curves(summary: &Summary) -> Result<String, Failure> {
+    let of_joint = |of: &ResidualOverAngle| {
+        let points = |means: &[Option<f64>]| {
+            let pairs = of.angle_rad.iter().zip(means);
+            pairs
+                .filter_map(|(angle, mean)| mean.map(|nm| (*angle, nm)))
+                .collect()
+        };
+        Curves {
+            title: of.joint.clone(),
+            unit: "residual [N m]",
+            first: ("forwards", points(&of.forward_nm)),
+            second: ("backwards", points(&of.backward_nm)),
+        }
+    };
+    let panels: Vec<Curves> = summary.residual_over_angle.iter().map(of_joint).collect();
+    Ok(curves(
+        "Mean residual of each joint over its angle, forwards and backwards",
+        "angle [rad]",
+        &panels,
+    )?)
 }
 
 /// Draws the curves of measured and predicted torques, and of residuals.
@@ -398,7 +487,11 @@ fn drawn<const N: usize>(
         });
     }
     Ok((
-        curves("Measured and predicted torque of each joint", &torques)?,
-        curves("Residual torque of each joint", &residuals)?,
+        curves(
+            "Measured and predicted torque of each joint",
+            "time [s]",
+            &torques,
+        )?,
+        curves("Residual torque of each joint", "time [s]", &residuals)?,
     ))
 }
