@@ -5,7 +5,7 @@ use std::fmt;
 
 /// Relative difference of two errors below which it does not matter, even if it is the same in all folds: with a few folds, chance
 /// gives a richer model such an advantage in one of six selections.
-const TIE: f64 = 0.005;
+const TIE: f64 = 0.001;
 
 /// A named set of options.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,7 +34,7 @@ pub struct CandidateResult {
 
 impl CandidateResult {
     /// Returns whether this candidate predicts as well as `best` does: the mean difference of their squared errors is at most its
-    /// standard error over the folds, or their errors differ by less than half a percent.
+    /// standard error over the folds, or their errors differ by less than 0.1 %.
     pub fn is_as_good_as(&self, best: &CandidateResult) -> bool {
         let differences: Vec<f64> = self
             .folds

@@ -915,7 +915,7 @@ def torque_scale(
     """Returns the ratio of true to logged torque of each moving joint; `None` if the known payload adds too little torque."""
 
 def dh_to_urdf(name: str, standard: bool, rows: list[list[float]], masses_kg: list[float] | None) -> str:
-    """Returns the text of a URDF; rows of ``a``, ``alpha``, ``d``, ``theta``."""
+    """Returns the text of a URDF; rows of `a`, `alpha`, `d`, `theta`."""
 
 def weigh(fit: Fit, logs: list[dict[str, Any]], mass_kg: float) -> dict[str, Any]:
     """Estimates torque scales and the place of a weight of known mass."""
