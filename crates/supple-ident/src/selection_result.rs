@@ -7,6 +7,10 @@ use std::fmt;
 /// gives a richer model such an advantage in one of six selections.
 const TIE: f64 = 0.001;
 
+/// Relative difference of two errors above which one is worse, however much the folds differ: the mean of a single fold that cannot be
+/// predicted is as large as its standard error.
+const WORSE: f64 = 0.05;
+
 /// A named set of options.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Candidate {
@@ -34,7 +38,7 @@ pub struct CandidateResult {
 
 impl CandidateResult {
     /// Returns whether this candidate predicts as well as `best` does: the mean difference of their squared errors is at most its
-    /// standard error over the folds, or their errors differ by less than 0.1 %.
+    /// standard error over the folds, or their errors differ by less than 0.1 %; never if they differ by more than 5 %.
     pub fn is_as_good_as(&self, best: &CandidateResult) -> bool {
         let differences: Vec<f64> = self
             .folds
@@ -48,7 +52,8 @@ impl CandidateResult {
         }
         let mean = differences.iter().sum::<f64>() / n;
         let variance = differences.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        mean <= (variance / n).sqrt() || self.total <= best.total * (1.0 + TIE)
+        let within = mean <= (variance / n).sqrt() && self.total <= best.total * (1.0 + WORSE);
+        within || self.total <= best.total * (1.0 + TIE)
     }
 }
 

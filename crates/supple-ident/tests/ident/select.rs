@@ -157,6 +157,8 @@ fn a_candidate_is_as_good_if_it_is_within_a_standard_error() {
     assert!(!result(&[1.0, 2.1, 3.2, 4.1]).is_as_good_as(&best));
     // Mean difference 0.1, standard error 0.2.
     assert!(result(&[1.5, 1.7, 3.1, 4.1]).is_as_good_as(&best));
+    // A fold that cannot be predicted: mean difference and standard error are equal.
+    assert!(!result(&[1.0, 2.0, 3.0, 4e9]).is_as_good_as(&best));
     assert!(best.is_as_good_as(&best));
     // 0.05 % in all folds does not matter.
     assert!(result(&[1.001, 2.002, 3.003, 4.004]).is_as_good_as(&best));
