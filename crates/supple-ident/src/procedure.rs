@@ -13,8 +13,8 @@ use crate::log_checks::{Consequence, Finding, Problem, check_log};
 use crate::motion::{ExcludedInterval, Motion, Preparation};
 use crate::options::{Options, Weights};
 use crate::select::{
-    band_candidates, compare, effects_candidates, friction_candidates, load_candidates,
-    prior_candidates, weights_candidates,
+    band_candidates, compare, compare_effects, effects_candidates, friction_candidates,
+    load_candidates, prior_candidates, weights_candidates,
 };
 use crate::selection_result::SelectionResult;
 use crate::spikes::without_spikes;
@@ -286,7 +286,7 @@ impl Procedure {
         };
         let (options, _) = before.options(nominal, motions, identified_joints)?;
         let candidates = effects_candidates(&options, &effects);
-        let table = compare(nominal, motions, identified_joints, &candidates, FOLDS)?;
+        let table = compare_effects(nominal, motions, identified_joints, &candidates, FOLDS)?;
         let chosen = Procedure {
             effects: table.options().effects.clone(),
             ..self.clone()

@@ -174,7 +174,10 @@ pub fn prior_candidates(base: &Options) -> Vec<Candidate> {
     ranked([1e4, 1e3, 1e2, 1e1, 1.0, 0.1].map(candidate).to_vec())
 }
 
-/// Cross-validates the candidates: predicts each of `parts` consecutive parts of every motion from the others.
+/// Relative tolerance within which effects count as equally good.
+const EFFECTS_TIE: f64 = 0.005;
+
+/// Cross-validates the candidates: predicts each fold from the others, and chooses by the rule of one standard error.
 ///
 /// # Errors
 /// No candidates; fewer than two parts; invalid columns. A candidate whose fit fails has an infinite error in
@@ -186,14 +189,54 @@ pub fn compare<const N: usize>(
     candidates: &[Candidate],
     parts: usize,
 ) -> Result<SelectionTable, IdentError> {
-    if candidates.is_empty() || parts < 2 {
+    let folds = fold_ranges(motions, parts);
+    let candidates = results(nominal, motions, identified_joints, candidates, &folds)?;
+    let best = best(&candidates, |result| result.total);
+    let chosen = simplest(&candidates, |result| {
+        result.is_as_good_as(&candidates[best])
+    });
+    Ok(SelectionTable {
+        chosen: chosen.unwrap_or(best),
+        candidates,
+    })
+}
+
+/// Does the same as [`compare`] for effects: by the relative error of all joints together, within [`EFFECTS_TIE`], over parts of each
+/// motion. Effects change the torques of strong joints by little everywhere: with three or four folds, the rule of one standard
+/// error finds effects in one of six arms that have none.
+pub(crate) fn compare_effects<const N: usize>(
+    nominal: &Arm<N>,
+    motions: &[Motion],
+    identified_joints: &[usize],
+    candidates: &[Candidate],
+    parts: usize,
+) -> Result<SelectionTable, IdentError> {
+    let folds = parts_of_each(motions, parts);
+    let candidates = results(nominal, motions, identified_joints, candidates, &folds)?;
+    let best = best(&candidates, |result| result.relative);
+    let within = candidates[best].relative * (1.0 + EFFECTS_TIE);
+    let chosen = simplest(&candidates, |result| result.relative <= within);
+    Ok(SelectionTable {
+        chosen: chosen.unwrap_or(best),
+        candidates,
+    })
+}
+
+/// Returns the result of each candidate.
+fn results<const N: usize>(
+    nominal: &Arm<N>,
+    motions: &[Motion],
+    identified_joints: &[usize],
+    candidates: &[Candidate],
+    folds: &[Vec<(usize, Range<usize>)>],
+) -> Result<Vec<CandidateResult>, IdentError> {
+    if candidates.is_empty() || folds.len() < 2 {
         return Err(IdentError::Option {
             option: "parts",
-            value: parts as f64,
+            value: folds.len() as f64,
             must: "2 or more, with at least one candidate",
         });
     }
-    let folds = fold_ranges(motions, parts);
     let mut results = Vec::new();
     let mut reason = None;
     for candidate in candidates {
@@ -206,13 +249,13 @@ pub fn compare<const N: usize>(
             &options.couplings,
         )?
         .with_effects(&options.effects);
-        let folds = rows_of_folds(nominal, &columns, motions, &folds)?;
+        let folds = rows_of_folds(nominal, &columns, motions, folds)?;
         let outcome = held_out(nominal, &columns, &folds, options);
         // A cancelled comparison has no result, even if a candidate failed for another reason.
         options.cancellation.check()?;
-        let squares = outcome.unwrap_or_else(|error| {
+        let (squares, relative) = outcome.unwrap_or_else(|error| {
             reason = Some(error);
-            Vec::new()
+            (Vec::new(), f64::INFINITY)
         });
         results.push(CandidateResult {
             candidate: candidate.clone(),
@@ -222,24 +265,31 @@ pub fn compare<const N: usize>(
                 false => mean(&squares).sqrt(),
             },
             folds: squares.into_iter().map(f64::sqrt).collect(),
+            relative,
         });
     }
-    let best = (0..results.len())
-        .min_by(|a, b| results[*a].total.total_cmp(&results[*b].total))
-        .unwrap_or(0);
-    if let (false, Some(reason)) = (results[best].total.is_finite(), reason) {
-        return Err(reason);
+    match reason {
+        Some(reason) if results.iter().all(|result| !result.total.is_finite()) => Err(reason),
+        _ => Ok(results),
     }
-    let within = |i: &usize| results[*i].is_as_good_as(&results[best]);
-    let chosen = (0..results.len()).filter(within).min_by(|a, b| {
-        let (a, b) = (&results[*a], &results[*b]);
-        let rank = |of: &CandidateResult| (of.columns, of.candidate.rank);
-        rank(a).cmp(&rank(b)).then(a.total.total_cmp(&b.total))
-    });
-    Ok(SelectionTable {
-        chosen: chosen.unwrap_or(best),
-        candidates: results,
-    })
+}
+
+/// Returns the index of the candidate with the smallest error.
+fn best(results: &[CandidateResult], error: impl Fn(&CandidateResult) -> f64) -> usize {
+    let indices = 0..results.len();
+    let best = indices.min_by(|a, b| error(&results[*a]).total_cmp(&error(&results[*b])));
+    best.unwrap_or(0)
+}
+
+/// Returns the index of the simplest of the candidates that are good.
+fn simplest(results: &[CandidateResult], good: impl Fn(&CandidateResult) -> bool) -> Option<usize> {
+    let rank = |i: &usize| (results[*i].columns, results[*i].candidate.rank);
+    (0..results.len())
+        .filter(|i| good(&results[*i]))
+        .min_by(|a, b| {
+            let by_error = results[*a].total.total_cmp(&results[*b].total);
+            rank(a).cmp(&rank(b)).then(by_error)
+        })
 }
 
 type Fold = Vec<Vec<JointRows>>;
@@ -262,6 +312,11 @@ fn fold_ranges(motions: &[Motion], parts: usize) -> Vec<Vec<(usize, Range<usize>
         }
         return ranges;
     }
+    parts_of_each(motions, parts)
+}
+
+/// Returns for each fold one of as many consecutive parts of each motion.
+fn parts_of_each(motions: &[Motion], parts: usize) -> Vec<Vec<(usize, Range<usize>)>> {
     let of_fold = |p: usize| {
         let part = |(i, motion): (usize, &Motion)| {
             let samples = motion.samples();
@@ -315,25 +370,31 @@ fn scales_nm2(folds: &[Fold]) -> Vec<f64> {
     own.iter().map(|own| (own * all).sqrt()).collect()
 }
 
-/// Returns for each fold the mean over the joints of the squared residual divided by the joint's scale.
+/// Returns for each fold the mean over the joints of the squared residual divided by the joint's scale, and `|tau - tau_hat| / |tau|` of
+/// all joints and folds.
 fn held_out<const N: usize>(
     nominal: &Arm<N>,
     columns: &Columns,
     folds: &[Fold],
     options: &Options,
-) -> Result<Vec<f64>, IdentError> {
+) -> Result<(Vec<f64>, f64), IdentError> {
     // Reduce the rows before the folds are copied: each fold is used by all fits but one.
     for rows in folds.iter().flatten().flatten() {
         rows.block(options.slow_rad_per_s);
     }
     let scales_nm2 = scales_nm2(folds);
-    let mut errors = Vec::new();
+    let (mut errors, mut residual_nm2, mut torque_nm2) = (Vec::new(), 0.0, 0.0);
     for (p, fold) in folds.iter().enumerate() {
         let others: Fold = (0..folds.len())
             .filter(|other| *other != p)
             .flat_map(|other| folds[other].clone())
             .collect();
         let fit = fit_rows(nominal, columns.clone(), &others, 1.0, options)?;
+        let sum = |values: Vec<f64>| values.iter().map(|nm| nm * nm).sum::<f64>();
+        for rows in fold.iter().flatten() {
+            residual_nm2 += sum(rows.residual(&fit.x));
+            torque_nm2 += sum(rows.torques());
+        }
         let of_joint = |(j, scale_nm2): (usize, &f64)| {
             let residuals = fold.iter().flat_map(|rows| rows[j].residual(&fit.x));
             let squares: Vec<f64> = residuals.map(|nm| nm * nm).collect();
@@ -342,5 +403,5 @@ fn held_out<const N: usize>(
         let of_joints: Vec<f64> = scales_nm2.iter().enumerate().map(of_joint).collect();
         errors.push(mean(&of_joints));
     }
-    Ok(errors)
+    Ok((errors, (residual_nm2 / torque_nm2).sqrt()))
 }

@@ -34,6 +34,8 @@ pub struct CandidateResult {
     pub folds: Vec<f64>,
     /// Root mean square over all folds; infinite if the fit failed.
     pub total: f64,
+    /// `|tau - tau_hat| / |tau|` of all joints and folds; infinite if the fit failed.
+    pub relative: f64,
 }
 
 impl CandidateResult {
@@ -75,11 +77,16 @@ impl SelectionTable {
 
 impl fmt::Display for SelectionTable {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "  columns  held-out error  candidate")?;
+        writeln!(f, "  columns  held-out error  of all torques  candidate")?;
         for (i, line) in self.candidates.iter().enumerate() {
             let mark = if i == self.chosen { '*' } else { ' ' };
-            let (total, name) = (100.0 * line.total, &line.candidate.name);
-            writeln!(f, "{mark} {:7}  {total:12.3} %  {name}", line.columns)?;
+            let (total, relative) = (100.0 * line.total, 100.0 * line.relative);
+            let name = &line.candidate.name;
+            writeln!(
+                f,
+                "{mark} {:7}  {total:12.3} %  {relative:12.3} %  {name}",
+                line.columns
+            )?;
         }
         Ok(())
     }

@@ -151,6 +151,7 @@ fn a_candidate_is_as_good_if_it_is_within_a_standard_error() {
         columns: 1,
         folds: folds.iter().map(|square| square.sqrt()).collect(),
         total: mean(folds).sqrt(),
+        relative: 0.0,
     };
     let best = result(&[1.0, 2.0, 3.0, 4.0]);
     // Mean difference 0.1, standard error over the folds 0.06.
