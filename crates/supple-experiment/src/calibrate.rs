@@ -324,6 +324,8 @@ pub struct FitOptions {
     pub prior_weight: f64,
     /// Prior standard deviation of the rotor inertias relative to those of the starting model; `None`: no prior.
     pub rotor_deviation: Option<f64>,
+    /// Whether effects besides friction are fitted where they predict better: springs, tilt, compliance and others.
+    pub effects: bool,
 }
 
 impl FitOptions {
@@ -333,6 +335,7 @@ impl FitOptions {
             friction,
             prior_weight: 1e-2,
             rotor_deviation: None,
+            effects: true,
         }
     }
 }
@@ -356,7 +359,10 @@ pub fn identify_with<const N: usize>(
         slow_rad_per_s,
         prior_weight: Some(options.prior_weight),
         rotor_deviation: options.rotor_deviation,
-        effects: Effects::all(DMatrix::from_fn(N, N, |m, j| motor_from_joint[(m, j)])),
+        effects: match options.effects {
+            true => Effects::all(DMatrix::from_fn(N, N, |m, j| motor_from_joint[(m, j)])),
+            false => Effects::default(),
+        },
         ..Procedure::default()
     };
     let fine = preparation(start.period_s, CUTOFF_HZ.1);

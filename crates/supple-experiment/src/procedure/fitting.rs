@@ -171,7 +171,8 @@ pub fn fit_first<const N: usize>(
     );
     let mut logs = vec![fitted];
     logs.extend_from_slice(others);
-    let (fit, _) = identify_best(model, &config, &logs, &[])?;
+    // Some twenty seconds at a quarter of the amplitude do not determine springs and tilt.
+    let (fit, _) = identify_best(model, &config, &logs, &[], false)?;
     let quality = quality(&config, &fit, &prepared(&held_out, &fit)?)?;
     let is_better = quality.validation_relative < quality.validation_relative_before;
     if !is_better {
@@ -204,7 +205,7 @@ pub fn fit_all<const N: usize>(
     others: &[Log],
 ) -> Result<(Description, FitQuality), ProcedureError> {
     let config = model.config::<N>()?;
-    let (fit, ripple) = identify_best(model, &config, logs, constant_speed)?;
+    let (fit, ripple) = identify_best(model, &config, logs, constant_speed, true)?;
     let motor_from_joint = *supple_core::Controller::new(config)?.motor_from_joint();
     let validation = with_ripple_torque(validation, &ripple, &motor_from_joint);
     let validation = prepared(&validation, &fit)?;
@@ -264,9 +265,15 @@ fn identify_best<const N: usize>(
     config: &Config<N>,
     logs: &[Log],
     constant_speed: &[Log],
+    effects: bool,
 ) -> Result<(Fit<N>, [RippleTable; N]), ProcedureError> {
     let min_rad_per_s = min_fitted_rad_per_s(logs);
     let (first, others) = fit_options(model);
+    let with = |options: FitOptions| FitOptions { effects, ..options };
+    let (first, others) = (
+        with(first),
+        others.into_iter().map(with).collect::<Vec<_>>(),
+    );
     let mut best = identify_with(config, logs, constant_speed, &first, min_rad_per_s)?;
     for options in &others {
         let other = identify_with(config, logs, constant_speed, options, min_rad_per_s)?;
@@ -288,6 +295,7 @@ fn fit_options(model: &Description) -> (FitOptions, Vec<FitOptions>) {
         },
         prior_weight: GEARED_PRIOR_WEIGHT,
         rotor_deviation: Some(GEARED_ROTOR_DEVIATION),
+        effects: true,
     };
     match model.bus() {
         None => (
