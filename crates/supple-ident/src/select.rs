@@ -202,8 +202,8 @@ pub fn compare<const N: usize>(
 }
 
 /// Does the same as [`compare`] for effects: by the relative error of all joints together, within [`EFFECTS_TIE`], over parts of each
-/// motion. Effects change the torques of strong joints by little everywhere: with three or four folds, the rule of one standard
-/// error finds effects in one of six arms that have none.
+/// motion. With the rule of one standard error one of ten simulated arms got effects that it does not have, because a gain that is the same
+/// in a few folds may be chance, and arms with effects got no better models.
 pub(crate) fn compare_effects<const N: usize>(
     nominal: &Arm<N>,
     motions: &[Motion],
