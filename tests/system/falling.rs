@@ -2,6 +2,7 @@
 //! disabled.
 
 use crate::running::{Up, json, run, stderr_of, temporary_folder};
+use core::time::Duration;
 use rustix::process::{Signal, kill_process};
 use std::path::Path;
 
@@ -143,4 +144,52 @@ fn gravity_hold_is_refused_while_the_arm_is_laid_down() {
         assert!(output.status.success(), "{}", stderr_of(&output));
     }
     up.wait_until("active drives", |status| status["drives"] == "active");
+}
+
+/// Expected: after the signal the arm is held, with its motors enabled, until `supple stop --supported`; then the system ends.
+#[test]
+fn an_arm_is_held_at_the_end_until_it_is_supported() {
+    let mut up = Up::start(&[
+        "--plant",
+        "emu",
+        "--arm",
+        "yam",
+        "--no-log",
+        "--no-realtime",
+        "--hold-until-supported",
+        "--json",
+    ]);
+    up.wait_until("active drives", |status| status["drives"] == "active");
+    kill_process(up.process(), Signal::TERM).expect("it runs");
+    std::thread::sleep(Duration::from_secs(4));
+    let supported = up.run(&["stop", "--supported"]);
+    assert!(supported.status.success(), "{}", stderr_of(&supported));
+    let output = up.ended();
+    let stderr = stderr_of(&output);
+    assert_eq!(output.status.code(), Some(0), "{stderr}");
+    let mut from = 0;
+    for stage in [
+        "holding the arm: ",
+        "the arm is held: support it, then run `supple stop --supported`",
+        "the arm is supported: its torque fades",
+        "disabling the motors: ",
+        "s: disabled",
+    ] {
+        let found = stderr[from..].find(stage);
+        from += found.unwrap_or_else(|| panic!("{stage}: {stderr}"));
+    }
+    assert!(!stderr.contains("laying the arm down"), "{stderr}");
+}
+
+/// An arm whose motors brake cannot be held at the end.
+#[test]
+fn an_arm_with_brakes_is_not_held_at_the_end() {
+    let folder = temporary_folder();
+    let output = run(
+        folder.path(),
+        &["up", "--plant", "emu", "--hold-until-supported"],
+    );
+    let words = stderr_of(&output);
+    assert_eq!(output.status.code(), Some(2), "{words}");
+    assert!(words.contains("--hold-until-supported"), "{words}");
 }

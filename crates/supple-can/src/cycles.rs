@@ -7,9 +7,9 @@ use supple_core::controller::NamesJoints;
 use supple_core::record::Text;
 use supple_drive::{
     Counters, Drive, Drives, LoopError, LossReason, PlantLoop, SharedMemoryLink, Stage,
-    TorqueOffBehaviour,
+    TemperatureWarning, TorqueOffBehaviour,
 };
-use supple_realtime::{Stop, diagnostics, monotonic_ns, pause};
+use supple_realtime::{Stop, diagnostics, monotonic_ns, pause, support_is_declared};
 
 /// Timeout of the search for an emulated arm \[ns\].
 const EMULATOR_TIMEOUT_NS: u64 = 5_000_000_000;
@@ -60,15 +60,21 @@ pub fn run_until_shutdown<const N: usize, D: Drive<N>>(
         TorqueOffBehaviour::Brakes => BRAKE_TIMEOUT_NS,
         TorqueOffBehaviour::Falls => STOW_TIMEOUT_NS,
     };
-    let until_ns = plant.drive().now_ns() + timeout_ns;
+    let mut until_ns = plant.drive().now_ns() + timeout_ns;
     if plant.drive().torque_off_behaviour() == TorqueOffBehaviour::Falls {
         // Motors that are being enabled are not active yet: this cycle ends their enabling.
         plant.run()?;
         stages.report(plant, joint_names);
     }
     while plant.drives() == Drives::Active && plant.drive().now_ns() < until_ns {
+        if support_is_declared() {
+            plant.declare_supported();
+        }
         plant.run()?;
         stages.report(plant, joint_names);
+        if plant.guard().waits_for_support() {
+            until_ns = plant.drive().now_ns() + timeout_ns;
+        }
     }
     Ok(EndReason::ShutDown)
 }
@@ -77,6 +83,8 @@ pub fn run_until_shutdown<const N: usize, D: Drive<N>>(
 struct StageReporter {
     loss: Option<(LossReason, u64)>,
     stage: Stage,
+    waits_for_support: bool,
+    temperature: TemperatureReport,
 }
 
 impl Default for StageReporter {
@@ -84,6 +92,8 @@ impl Default for StageReporter {
         StageReporter {
             loss: None,
             stage: Stage::Resting,
+            waits_for_support: false,
+            temperature: TemperatureReport::default(),
         }
     }
 }
@@ -95,6 +105,20 @@ impl StageReporter {
         plant: &PlantLoop<N, D, SharedMemoryLink>,
         joint_names: &[Text],
     ) {
+        let drive = plant.drive();
+        let now_ns = drive.now_ns();
+        if let Some(warning) = drive.temperature_warning()
+            && self.temperature.is_new(&warning, now_ns)
+        {
+            let joint = joint_names.get(warning.motor).copied();
+            let joint = joint.unwrap_or(Text::EMPTY);
+            let limit = 100.0 * warning.torque_share;
+            diagnostics::post(format_args!(
+                "supple-can: warning: motor {} ({joint}) is at {} degrees Celsius; it has {limit:.0} % of its torque limit: let it cool",
+                warning.motor + 1,
+                warning.celsius
+            ));
+        }
         let in_words = |reason: &LossReason| reason.with_names(joint_names).to_string();
         let guard = plant.guard();
         let falls = plant.drive().torque_off_behaviour() == TorqueOffBehaviour::Falls;
@@ -105,16 +129,25 @@ impl StageReporter {
                 diagnostics::post(format_args!("supple-can: set to idle: {reason}"));
             }
         }
+        if guard.waits_for_support() && !self.waits_for_support {
+            diagnostics::post(format_args!(
+                "supple-can: the arm is held: support it, then run `supple stop --supported` or `kill -USR1 {}`",
+                std::process::id()
+            ));
+        }
+        self.waits_for_support = guard.waits_for_support();
         if guard.stage() == self.stage {
             return;
         }
-        let drive = plant.drive();
         let time_s = drive.monotonic_ns(drive.now_ns()) as f64 * 1e-9;
         match (guard.stage(), self.stage) {
             (Stage::Active, _) => diagnostics::post(format_args!("supple-can: active")),
             (Stage::Holding(reason, _), _) => diagnostics::post(format_args!(
                 "supple-can: {time_s:.4} s: holding the arm: {}",
                 in_words(&reason)
+            )),
+            (Stage::Releasing(..), _) => diagnostics::post(format_args!(
+                "supple-can: {time_s:.4} s: the arm is supported: its torque fades"
             )),
             (Stage::Stowing(reason, _), _) => diagnostics::post(format_args!(
                 "supple-can: {time_s:.4} s: laying the arm down: {}",
@@ -134,6 +167,36 @@ impl StageReporter {
             _ => {}
         }
         self.stage = guard.stage();
+    }
+}
+
+/// What has been reported of hot motors.
+#[derive(Default)]
+struct TemperatureReport {
+    /// The last report.
+    last: Option<TemperatureWarning>,
+    /// Time of the last warning, reported or not \[ns\].
+    last_ns: u64,
+}
+
+impl TemperatureReport {
+    /// Time without a warning after which the next one is reported again \[ns\].
+    const AGAIN_NS: u64 = 60_000_000_000;
+    /// Increase of the temperature that is reported \[degrees Celsius\].
+    const STEP_CELSIUS: u8 = 5;
+
+    /// Whether a warning is reported: the first one, and each increase by [`TemperatureReport::STEP_CELSIUS`].
+    fn is_new(&mut self, warning: &TemperatureWarning, now_ns: u64) -> bool {
+        let paused = now_ns.saturating_sub(self.last_ns) > TemperatureReport::AGAIN_NS;
+        self.last_ns = now_ns;
+        let last = self.last.filter(|_| !paused);
+        let is_new = last.is_none_or(|last| {
+            warning.celsius >= last.celsius.saturating_add(TemperatureReport::STEP_CELSIUS)
+        });
+        if is_new {
+            self.last = Some(*warning);
+        }
+        is_new
     }
 }
 
@@ -178,5 +241,30 @@ pub fn sum_counters(a: &Counters, b: &Counters) -> Counters {
         replies_lost: a.replies_lost + b.replies_lost,
         overruns: a.overruns + b.overruns,
         ..*b
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SECOND_NS: u64 = 1_000_000_000;
+
+    #[test]
+    fn a_hot_motor_is_reported_once_per_five_degrees_and_again_after_a_pause() {
+        let mut report = TemperatureReport::default();
+        let mut is_new = |celsius, second| {
+            let warning = TemperatureWarning {
+                motor: 1,
+                celsius,
+                torque_share: 1.0,
+            };
+            report.is_new(&warning, second * SECOND_NS)
+        };
+        assert!(is_new(70, 1));
+        assert!(!is_new(71, 2) && !is_new(70, 30) && !is_new(74, 80));
+        assert!(is_new(75, 81));
+        assert!(!is_new(72, 82));
+        assert!(is_new(70, 150));
     }
 }

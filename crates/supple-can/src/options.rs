@@ -30,6 +30,9 @@ pub struct Options {
     /// Speed of elbow and forearm at which the safety module ends torque (m/s).
     #[arg(long, value_name = "M_PER_S", default_value_t = 1.0, value_parser = speed)]
     pub speed_limit_m_per_s: f64,
+    /// At the end, holds an arm that falls without torque until SIGUSR1 declares that the arm is supported, instead of laying it down.
+    #[arg(long)]
+    pub hold_until_supported: bool,
     /// Tares the force/torque sensor at start-up.
     #[arg(long)]
     pub tare: bool,

@@ -252,6 +252,14 @@ pub enum Failure {
         /// Its joints.
         joints: usize,
     },
+    /// A shutdown can only hold an arm whose motors do not brake.
+    #[error(
+        "--hold-until-supported: the motors of `{arm}` brake without torque on this plant: leave the option out"
+    )]
+    ArmHasBrakes {
+        /// Name of the arm.
+        arm: String,
+    },
     /// Options of a simulated arm were given for a real one.
     #[error(
         "--plant-options, --realistic, --block-m, --trace and --start-error work only with a simulated arm: use --plant sim or --plant emu"
@@ -583,7 +591,8 @@ impl Failure {
             Failure::Injection(_) | Failure::InjectionIntoRealArm => 2,
             Failure::OptionsOfRealArm
             | Failure::MisbehaviourWithoutMotors
-            | Failure::NoDrivesForArm { .. } => 2,
+            | Failure::NoDrivesForArm { .. }
+            | Failure::ArmHasBrakes { .. } => 2,
             Failure::EffectsWithoutArm
             | Failure::ModelOfRunningSystem { .. }
             | Failure::EffectsOfInProcess

@@ -59,6 +59,7 @@ pub fn set_partial_folder(partial: Option<PathBuf>) {
 )]
 pub fn install() {
     supple_realtime::ignore_file_size_and_tty_signals();
+    supple_realtime::listen_for_support();
     // If the handler cannot be installed, the signal still ends the program, but the folder remains.
     let _ = ctrlc::set_handler(|| {
         if let Some(stop) = SHUTDOWN_REQUEST.get() {

@@ -58,6 +58,17 @@ pub struct DriveState {
     pub loss: Option<LossReason>,
 }
 
+/// Motor that is hotter than its warning limit, but not yet at the limit of a fault.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TemperatureWarning {
+    /// Index of the motor.
+    pub motor: usize,
+    /// Temperature \[degrees Celsius\].
+    pub celsius: u8,
+    /// Fraction of the torque limit that the motor still has, 0 to 1.
+    pub torque_share: f64,
+}
+
 /// Counters since the start.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DriveCounters {
@@ -131,6 +142,11 @@ pub trait Drive<const N: usize> {
 
     /// State of the drives.
     fn state(&self) -> DriveState;
+
+    /// Returns the hottest motor if it is above its warning limit.
+    fn temperature_warning(&self) -> Option<TemperatureWarning> {
+        None
+    }
 
     /// Activates drives that have no operator's switch, once per cycle. They become active if this is `allowed`, a controller
     /// in gravity hold requests torque, and no loss is latched. Returns whether they became active in this call.

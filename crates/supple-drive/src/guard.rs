@@ -7,6 +7,8 @@
 //! arms that fall without torque:
 //!   active --(the same)--> holding --(hold time)--> stowing --(the arm lies)--> lowering --> resting
 //!   holding or stowing --(overspeed)--> damping --(standstill, 10 s, or runaway)--> lowering --> resting
+//! and, if asked, when the program is shutting down:
+//!   holding --(the operator has declared that the arm is supported)--> releasing --(torque faded)--> lowering --> resting
 //! ```
 //!
 //! The loop sends torques in the active stage. It also sends them in the resting stage, in which idle motors ignore them, so
@@ -59,6 +61,8 @@ pub struct GuardInput {
     pub drive_loss: Option<LossReason>,
     /// Whether the program is shutting down.
     pub shutting_down: bool,
+    /// Whether the operator has declared that the arm is supported.
+    pub supported: bool,
 }
 
 /// Torque that a cycle sends.
@@ -72,6 +76,8 @@ pub enum Torque {
     Hold,
     /// As [`Torque::Hold`], with a spring towards the rest pose.
     Stow,
+    /// As [`Torque::Hold`], fading to zero.
+    Release,
     /// Zero, with the damping of the motors.
     Damp,
     /// Zero.
@@ -100,6 +106,8 @@ pub enum Stage {
     Holding(LossReason, u64),
     /// An arm that falls without torque is laid down: the reason, and since when \[ns\].
     Stowing(LossReason, u64),
+    /// The torque of an arm that is supported fades while the motors damp: the reason, and since when \[ns\].
+    Releasing(LossReason, u64),
     /// The motors of an arm that falls damp without torque: the reason, and since when \[ns\].
     Damping(LossReason, u64),
     /// The torque is being ended: the reason, and since when \[ns\].
@@ -112,6 +120,10 @@ pub struct SafeActionMachine {
     torque_off_behaviour: TorqueOffBehaviour,
     /// Time for which an arm that falls is held before it is laid down \[ns\].
     hold_ns: u64,
+    /// Whether a shutdown holds the arm until it is supported, instead of laying it down.
+    holds_until_supported: bool,
+    /// Whether the arm is held for this reason.
+    waits_for_support: bool,
     stage: Stage,
     /// Time since which answers are missing \[ns\].
     unanswered_ns: Option<u64>,
@@ -135,6 +147,8 @@ impl SafeActionMachine {
         SafeActionMachine {
             torque_off_behaviour: TorqueOffBehaviour::Brakes,
             hold_ns: 0,
+            holds_until_supported: false,
+            waits_for_support: false,
             stage: Stage::Resting,
             unanswered_ns: None,
             unsent_ns: None,
@@ -153,6 +167,11 @@ impl SafeActionMachine {
         }
     }
 
+    /// Makes a shutdown hold an arm that falls until the operator has declared that it is supported, instead of laying it down.
+    pub const fn hold_until_supported(&mut self) {
+        self.holds_until_supported = true;
+    }
+
     /// Current stage.
     pub fn stage(&self) -> Stage {
         self.stage
@@ -163,17 +182,24 @@ impl SafeActionMachine {
         self.last_loss
     }
 
+    /// Whether the arm is held until the operator declares that it is supported.
+    pub fn waits_for_support(&self) -> bool {
+        self.waits_for_support
+    }
+
     /// Whether the loop itself holds an arm that falls without torque, or lays it down.
     pub fn holds(&self) -> bool {
         match self.stage {
-            Stage::Holding(..) | Stage::Stowing(..) | Stage::Damping(..) => true,
+            Stage::Holding(..) | Stage::Stowing(..) | Stage::Releasing(..) | Stage::Damping(..) => {
+                true
+            }
             Stage::Lowering(..) => self.torque_off_behaviour == TorqueOffBehaviour::Falls,
             Stage::Resting | Stage::Active => false,
         }
     }
 
-    /// Runs one cycle. `lies` is whether an arm that is being laid down has arrived, or whether an arm that is damped stands
-    /// still or is not slowed.
+    /// Runs one cycle. `lies` is whether an arm that is being laid down has arrived, whether the torque of a supported arm has
+    /// faded, or whether an arm that is damped stands still or is not slowed.
     pub fn cycle(&mut self, input: &GuardInput, lies: bool) -> Action {
         let loss = self.most_severe_loss(input);
         let active = input.drives == Drives::Active;
@@ -196,19 +222,27 @@ impl SafeActionMachine {
             }
             // An arm that falls may lose its motors one after another: the remaining motors continue. Without an active motor the
             // arm cannot be held.
-            Stage::Holding(..) | Stage::Stowing(..) | Stage::Damping(..) if !active => {
+            Stage::Holding(..) | Stage::Stowing(..) | Stage::Releasing(..) | Stage::Damping(..)
+                if !active =>
+            {
                 self.stage = Stage::Resting;
             }
             Stage::Holding(reason, since_ns) => {
                 if let Some(loss) = hold_loss {
                     self.stage = Stage::Damping(loss, input.now_ns);
+                } else if self.must_wait_for_support(input) {
+                    if input.supported {
+                        self.stage = Stage::Releasing(reason, input.now_ns);
+                    }
                 } else if input.now_ns >= since_ns + self.hold_ns {
                     self.stage = Stage::Stowing(reason, input.now_ns);
                 }
             }
-            Stage::Stowing(reason, _) => {
+            Stage::Stowing(reason, _) | Stage::Releasing(reason, _) => {
                 if let Some(loss) = hold_loss {
                     self.stage = Stage::Damping(loss, input.now_ns);
+                } else if self.is_stowing() && self.must_wait_for_support(input) {
+                    self.stage = Stage::Holding(reason, input.now_ns);
                 } else if lies {
                     self.stage = Stage::Lowering(reason, input.now_ns);
                 }
@@ -226,6 +260,8 @@ impl SafeActionMachine {
             }
             Stage::Resting => {}
         }
+        self.waits_for_support =
+            matches!(self.stage, Stage::Holding(..)) && self.must_wait_for_support(input);
         self.action(input)
     }
 
@@ -243,6 +279,7 @@ impl SafeActionMachine {
             Stage::Active => only(commanded(Torque::Fallback)),
             Stage::Holding(..) => only(Torque::Hold),
             Stage::Stowing(..) => only(Torque::Stow),
+            Stage::Releasing(..) => only(Torque::Release),
             Stage::Damping(..) => only(Torque::Damp),
             Stage::Lowering(loss, since_ns) => {
                 let overdue = input.now_ns >= since_ns + FALLBACK_NS;
@@ -269,6 +306,16 @@ impl SafeActionMachine {
         };
         self.motor_without_torque = loss.leaves_a_motor_without_torque();
         self.last_loss = Some((loss, now_ns));
+    }
+
+    fn is_stowing(&self) -> bool {
+        matches!(self.stage, Stage::Stowing(..))
+    }
+
+    /// Whether the arm is held until the operator has declared that it is supported. An arm with a motor without torque cannot be
+    /// held for long, and is laid down.
+    fn must_wait_for_support(&self, input: &GuardInput) -> bool {
+        self.holds_until_supported && input.shutting_down && !self.motor_without_torque
     }
 
     fn encoder_lost(&self) -> bool {

@@ -28,8 +28,8 @@ mod unconfirmed;
 
 pub use budget::{Budget, BudgetLine, Overload, SPARE_SHARE};
 pub use drive::{
-    Drive, DriveCounters, DriveState, LoweringMode, Reading, ReservedTimes, TipForce,
-    TorqueOffBehaviour,
+    Drive, DriveCounters, DriveState, LoweringMode, Reading, ReservedTimes, TemperatureWarning,
+    TipForce, TorqueOffBehaviour,
 };
 pub use error::LoopError;
 pub use guard::{

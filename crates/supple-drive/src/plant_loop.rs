@@ -55,6 +55,7 @@ pub struct PlantLoop<const N: usize, D, L> {
     fallback_nm: Vector<N>,
     counters: Counters,
     shutting_down: bool,
+    supported: bool,
 }
 
 impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
@@ -99,12 +100,23 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
             fallback_nm: Vector::zeros(),
             counters: Counters::default(),
             shutting_down: false,
+            supported: false,
         })
     }
 
     /// Ends normal operation from the next cycle on, because the program is about to end.
     pub fn begin_shutdown(&mut self) {
         self.shutting_down = true;
+    }
+
+    /// Makes a shutdown hold an arm that falls without torque until [`PlantLoop::declare_supported`], instead of laying it down.
+    pub fn hold_until_supported(&mut self) {
+        self.guard.hold_until_supported();
+    }
+
+    /// Declares that the operator supports the arm, which is held at shutdown until then if so configured.
+    pub fn declare_supported(&mut self) {
+        self.supported = true;
     }
 
     /// Counters of the cycle.
@@ -205,6 +217,7 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
             drives: state.drives,
             drive_loss: state.loss,
             shutting_down: self.shutting_down,
+            supported: self.supported,
         };
         let lies = self.has_stowed(now_ns);
         let action = self.guard.cycle(&input, lies);
@@ -318,13 +331,17 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         Ok(command)
     }
 
-    /// Whether an arm that is being laid down has arrived, or an arm that is damped stands still or is not slowed.
+    /// Whether an arm that is being laid down has arrived, the torque of a supported arm has faded, or an arm that is damped
+    /// stands still or is not slowed.
     fn has_stowed(&self, now_ns: u64) -> bool {
         match (self.guard.stage(), &self.stowing) {
             (Stage::Stowing(_, since_ns), Some(stowing)) => {
                 stowing.has_ended((now_ns - since_ns) as f64 * 1e-9)
             }
-            (Stage::Stowing(..), None) => true,
+            (Stage::Releasing(_, since_ns), Some(stowing)) => {
+                stowing.has_released((now_ns - since_ns) as f64 * 1e-9)
+            }
+            (Stage::Stowing(..) | Stage::Releasing(..), None) => true,
             (Stage::Damping(..), _) => {
                 self.hold_check.stands_still() || self.hold_check.runs_away()
             }
@@ -343,12 +360,15 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         let (wanted_nm, stopping) = match (action.torque, command) {
             (Torque::Command, Some(command)) => (command.torque_nm, command.fault),
             (Torque::Fallback, _) => (self.fallback_nm, true),
-            (Torque::Hold | Torque::Stow, _) => match &mut self.stowing {
+            (Torque::Hold | Torque::Stow | Torque::Release, _) => match &mut self.stowing {
                 Some(stowing) => {
                     damping_nm_s_per_rad = stowing.config().damping_nm_s_per_rad;
                     let torque_nm = match self.guard.stage() {
                         Stage::Stowing(_, since_ns) => {
                             stowing.stow_nm((now_ns - since_ns) as f64 * 1e-9)
+                        }
+                        Stage::Releasing(_, since_ns) => {
+                            stowing.release_nm((now_ns - since_ns) as f64 * 1e-9)
                         }
                         _ => {
                             stowing.reset();

@@ -109,6 +109,17 @@ impl<const N: usize> Stowing<N> {
         torque_nm * (1.0 - (elapsed_s - duration_s) / FADE_S).clamp(0.0, 1.0)
     }
 
+    /// Computes the torque of a supported arm, which fades from the holding torque to zero, `elapsed_s` after its support was
+    /// declared \[N m\].
+    pub fn release_nm(&self, elapsed_s: f64) -> Vector<N> {
+        self.hold_nm() * (1.0 - elapsed_s / FADE_S).clamp(0.0, 1.0)
+    }
+
+    /// Whether the torque of a supported arm has faded and the arm has settled, `elapsed_s` after its support was declared.
+    pub fn has_released(&self, elapsed_s: f64) -> bool {
+        elapsed_s > FADE_S + SETTLE_S
+    }
+
     /// Whether laying down has ended, `elapsed_s` after its start.
     pub fn has_ended(&self, elapsed_s: f64) -> bool {
         match (self.config.stow_rad, self.begin) {

@@ -19,6 +19,7 @@ mod schedule;
 mod settings;
 mod spin;
 mod stop;
+mod supported;
 
 pub use settings::Settings;
 
@@ -34,6 +35,7 @@ pub use private_folder::{
 pub use processor::run_on_supported_processor;
 pub use spin::spin_duration;
 pub use stop::{Stop, StopError, die_with_parent, ignore_file_size_and_tty_signals};
+pub use supported::{listen_for_support, support_is_declared};
 
 use std::io::Error;
 

@@ -1,5 +1,6 @@
 //! Shutdown request: SIGINT, SIGTERM or SIGHUP, or the end of the parent process.
 
+use crate::supported::listen_for_support;
 use rustix::process::{Signal, set_parent_process_death_signal};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,6 +21,7 @@ impl Stop {
     /// [`StopError`] if it was called before or the system refuses.
     pub fn on_signals() -> Result<Stop, StopError> {
         ignore_file_size_and_tty_signals();
+        listen_for_support();
         let stop = Stop::default();
         let flag = stop.clone();
         ctrlc::set_handler(move || flag.request_shutdown())?;

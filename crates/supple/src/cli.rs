@@ -92,7 +92,7 @@ pub enum Command {
     /// Clear the latched fault of a running system.
     Reset(SystemArgs),
     /// Shut a running system down; its controller first sets the drives to idle.
-    Stop(SystemArgs),
+    Stop(StopArgs),
     /// Check whether this machine can run an arm in real time.
     #[command(after_help = CODES)]
     Doctor {
@@ -159,6 +159,17 @@ pub struct SystemArgs {
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
+}
+
+/// Arguments of `stop`.
+#[derive(Clone, Debug, Args)]
+pub struct StopArgs {
+    /// Declare that the arm is supported: an arm that `supple up --hold-until-supported` holds is released.
+    #[arg(long)]
+    pub supported: bool,
+    /// The system.
+    #[command(flatten)]
+    pub system: SystemArgs,
 }
 
 /// Plant to run.
@@ -396,6 +407,9 @@ pub struct UpArgs {
     /// Write motor torques and tip forces of the simulated or emulated arm as CSV.
     #[arg(long, value_name = "FILE")]
     pub trace: Option<PathBuf>,
+    /// At the end, hold an arm without brakes until `supple stop --supported`, instead of laying it down.
+    #[arg(long, conflicts_with = "virtual_time")]
+    pub hold_until_supported: bool,
     /// Control rate in Hz. Default: the rate of the arm description.
     #[arg(long, value_name = "HZ", value_parser = clap::value_parser!(u32).range(10..=10_000))]
     pub rate_hz: Option<u32>,
@@ -595,8 +609,8 @@ impl Command {
             | Command::Pendant { system, .. }
             | Command::AtHome(AtHomeArgs { system, .. })
             | Command::Status(system)
-            | Command::Reset(system)
-            | Command::Stop(system) => system.json,
+            | Command::Reset(system) => system.json,
+            Command::Stop(args) => args.system.json,
             Command::Motors(args) => args.json,
             Command::Sweep(args) => args.json,
             Command::Doctor { json } => *json,

@@ -70,7 +70,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Pendant { action, system } => operate::pendant(*action, system.prefix.as_deref()),
         Command::AtHome(args) => operate::at_home(args),
         Command::Reset(system) => operate::reset(system),
-        Command::Stop(system) => operate::stop(system),
+        Command::Stop(args) => operate::stop(args),
         Command::Offline(OfflineCommand::Log(LogCommand::Data(command))) => log::run(command),
         Command::Offline(OfflineCommand::Arms(args)) => arms::run(args),
         Command::Offline(OfflineCommand::Plant(command)) => command.run(),

@@ -5,7 +5,7 @@ use super::rig::{MS, Rig};
 use supple_bus::{FaultKind, FaultRule, TrafficDirection};
 use supple_core::controller::Request;
 use supple_damiao::Status;
-use supple_drive::{LossReason, MotorFault, Stage};
+use supple_drive::{Drive, LossReason, MotorFault, Stage};
 
 /// Time of the misbehaviours after the enabling of the motors.
 const AT: &str = "at-s=0.4";
@@ -114,6 +114,26 @@ fn silent_restarted_and_hot_motors_are_reported() {
             rig.fastest
         );
     }
+}
+
+/// Expected: a motor at 75 degrees warns and keeps its torque limit; at 88 degrees its limit falls, and the arm is still held.
+#[test]
+fn a_warm_motor_warns_before_its_limit_falls() {
+    let spec = format!("hot:motor=2,celsius=75,{AT}");
+    let hotter = "hot:motor=2,celsius=88,at-s=1.2".to_owned();
+    let mut rig = Rig::<7>::new("openarm", &[&spec, &hotter]);
+    rig.activate();
+    assert_eq!(rig.plant.drive().temperature_warning(), None);
+    rig.run_s(0.5);
+    let warning = rig.plant.drive().temperature_warning().unwrap();
+    assert_eq!((warning.motor, warning.celsius), (1, 75));
+    assert_eq!(warning.torque_share, 1.0);
+    rig.run_s(1.0);
+    let warning = rig.plant.drive().temperature_warning().unwrap();
+    assert!((86..=88).contains(&warning.celsius), "{warning:?}");
+    assert!((0.5..1.0).contains(&warning.torque_share), "{warning:?}");
+    assert_eq!(rig.plant.guard().stage(), Stage::Active);
+    assert!(rig.all(Status::Enabled));
 }
 
 /// The controller is lost during a motion: the plant loop stops the arm, lays it down and disables the motors.

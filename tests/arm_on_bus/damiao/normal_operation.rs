@@ -32,6 +32,36 @@ fn enabling_in_gravity_hold_moves_nothing() {
     check::<6>("yam");
 }
 
+/// Expected: from the first cycle in which a motor applies torque on, its torque is that of gravity within the rounding of two
+/// frames (the shoulder's step is 26 mN m) and 0.01 N m of the loop.
+#[test]
+fn enabling_makes_no_step_in_torque() {
+    fn check<const N: usize>(name: &str) {
+        let mut rig = Rig::<N>::new(name, &[]);
+        let config = rig.description.config::<N>().unwrap();
+        rig.run(5);
+        rig.request(Request::GravityHold);
+        let mut enabled = 0;
+        for _ in 0..200 {
+            rig.step();
+            let truth = rig.arm().truth();
+            let gravity_nm = supple_core::dynamics::gravity(&config.arm, &truth.position_rad);
+            let torque_nm = rig.arm().motor_torque_nm();
+            for (joint, motor) in rig.arm().motors().iter().enumerate() {
+                if motor.status() != Status::Enabled || torque_nm[joint] == 0.0 {
+                    continue;
+                }
+                enabled += 1;
+                let step_nm = (torque_nm[joint] - gravity_nm[joint]).abs();
+                assert!(step_nm < 0.07, "{name} joint {joint}: {step_nm} N m");
+            }
+        }
+        assert!(enabled > 100 * N, "{name}: {enabled}");
+    }
+    check::<7>("openarm");
+    check::<6>("yam");
+}
+
 /// The motors stay disabled in every mode except gravity hold, and without a controller that requests torque.
 #[test]
 fn motors_are_enabled_in_gravity_hold_only() {
@@ -132,6 +162,80 @@ fn a_shutdown_lays_the_arm_down() {
     );
     assert_eq!(rig.plant.guard().stage(), Stage::Resting);
     assert!(rig.max_speed_rad_per_s < 0.5, "{}", rig.max_speed_rad_per_s);
+}
+
+/// Expected: a shutdown in any mode that applies torque, also during a motion, lays the arm down and disables its motors, and no
+/// joint exceeds its speed limit.
+#[test]
+fn a_shutdown_in_every_mode_lays_the_arm_down() {
+    type Begin = fn(&mut Rig<6>);
+    let modes: [(&str, Begin); 5] = [
+        ("gravity hold", |_| ()),
+        ("float", |rig| rig.request(Request::Float)),
+        ("move", |rig| rig.begin(false)),
+        ("track", |rig| rig.begin(true)),
+        ("while motors are being enabled", |rig| {
+            *rig = Rig::new("yam", &[]);
+            rig.run(5);
+            rig.request(Request::GravityHold);
+            rig.run(3);
+        }),
+    ];
+    for (mode, begin) in modes {
+        let mut rig = Rig::<6>::new("yam", &[]);
+        rig.activate();
+        begin(&mut rig);
+        rig.run_s(0.2);
+        rig.discard_measurements();
+        rig.plant.begin_shutdown();
+        rig.run_s(20.0);
+        assert!(rig.all(Status::Disabled), "{mode}");
+        assert_eq!(rig.plant.guard().stage(), Stage::Resting, "{mode}");
+        let names = rig.stage_names();
+        assert!(!names.contains(&"damping"), "{mode}: {names:?}");
+        assert!(
+            rig.max_speed_rad_per_s < 1.0,
+            "{mode}: {}",
+            rig.max_speed_rad_per_s
+        );
+    }
+}
+
+/// Expected, if asked: a shutdown holds the arm for as long as nobody supports it, within 10 mrad; then its torque fades and the
+/// motors are disabled. A shutdown while the arm is being laid down after a loss holds it too.
+#[test]
+fn a_shutdown_holds_the_arm_until_it_is_supported() {
+    let mut rig = Rig::<7>::new("openarm", &[]);
+    rig.plant.hold_until_supported();
+    rig.activate();
+    let held_rad = rig.arm().truth().position_rad;
+    rig.plant.begin_shutdown();
+    rig.run_s(30.0);
+    assert_eq!(rig.stage_names(), ["resting", "active", "holding"]);
+    assert!(rig.plant.guard().waits_for_support());
+    assert!(rig.all(Status::Enabled));
+    let moved = (rig.arm().truth().position_rad - held_rad).amax();
+    assert!(moved < 0.01, "{moved} rad");
+    rig.plant.declare_supported();
+    rig.run_s(1.0);
+    assert!(rig.all(Status::Enabled));
+    let torque_nm = rig.arm().motor_torque_nm().amax();
+    assert!(torque_nm < 1.0, "{torque_nm} N m after the fade");
+    rig.run_s(1.0);
+    assert!(rig.all(Status::Disabled));
+    let names = rig.stage_names();
+    assert_eq!(names[3..], ["releasing", "lowering", "resting"]);
+
+    let mut rig = Rig::<7>::new("openarm", &[]);
+    rig.plant.hold_until_supported();
+    rig.activate();
+    rig.request(Request::Idle);
+    rig.run_s(1.5);
+    assert!(matches!(rig.plant.guard().stage(), Stage::Stowing(..)));
+    rig.plant.begin_shutdown();
+    rig.run_s(10.0);
+    assert!(rig.plant.guard().waits_for_support());
+    assert!(rig.all(Status::Enabled));
 }
 
 /// Returns the OpenArm with motors that use classic frames.

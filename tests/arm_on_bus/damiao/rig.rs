@@ -212,6 +212,7 @@ impl<const N: usize> Rig<N> {
             Stage::Active => "active",
             Stage::Holding(..) => "holding",
             Stage::Stowing(..) => "stowing",
+            Stage::Releasing(..) => "releasing",
             Stage::Damping(..) => "damping",
             Stage::Lowering(..) => "lowering",
         };

@@ -16,6 +16,7 @@ fn without_loss(ms: u64) -> GuardInput {
         drives: Drives::Active,
         drive_loss: None,
         shutting_down: false,
+        supported: false,
     }
 }
 

@@ -28,7 +28,7 @@ pub use status::status;
 pub use teaching::{play, teach};
 
 use crate::cli::{
-    GainsArgs, ModeArgs, ModeName, SystemArgs, TrackArgs, TrackTarget, TrackTrajectory,
+    GainsArgs, ModeArgs, ModeName, StopArgs, SystemArgs, TrackArgs, TrackTarget, TrackTrajectory,
     UpTrajectory,
 };
 use crate::up::stop_running;
@@ -264,10 +264,11 @@ fn follow(
 ///
 /// # Errors
 /// [`Failure::NotRunning`].
-pub fn stop(system: &SystemArgs) -> Result<(), Failure> {
+pub fn stop(args: &StopArgs) -> Result<(), Failure> {
+    let system = &args.system;
     let domain = Domain::new(system.prefix.as_deref()).map_err(Failure::system)?;
     let start = Instant::now();
-    while !stop_running(&domain)? {
+    while !stop_running(&domain, args.supported)? {
         // `supple up` creates its pidfile again if another program has removed it.
         if !idle_socket_is_open(&domain) || start.elapsed() > TELEMETRY_TIMEOUT {
             return Err(Failure::NotRunning {

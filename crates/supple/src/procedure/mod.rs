@@ -197,6 +197,7 @@ impl MovedArm<'_> {
             zero_at_home: args.zero_at_home,
             learn: false,
             tare: false,
+            hold_until_supported: false,
             block_m: None,
             inject: args.inject.clone(),
             misbehave: Vec::new(),

@@ -17,7 +17,7 @@ use supple_cli::exit::Failure;
 use supple_cli::interrupt;
 use supple_cli::sibling::program_beside;
 use supple_ipc::Domain;
-use supple_realtime::pause;
+use supple_realtime::{pause, support_is_declared};
 
 /// Exit code of a program that cannot write a file.
 const FILE_CODE: i32 = 6;
@@ -124,10 +124,7 @@ impl ChildProcesses {
         let Some((_, child)) = self.running.iter().find(|(n, _)| *n == name) else {
             return Err(Failure::NoSuchProcess { name });
         };
-        if let Some(pid) = i32::try_from(child.id()).ok().and_then(Pid::from_raw) {
-            // Ignore errors: the process may have exited already.
-            let _ = kill_process(pid, signal);
-        }
+        send(child, signal);
         Ok(())
     }
 
@@ -150,7 +147,7 @@ impl ChildProcesses {
     }
 
     /// Terminates a program and waits for it while calling `poll` repeatedly, until `poll` fails; kills the program
-    /// after the timeout `within`.
+    /// after the timeout `within`. Forwards a declaration of the operator that the arm is supported.
     ///
     /// # Errors
     /// The error of `poll`, after the program has exited.
@@ -165,13 +162,17 @@ impl ChildProcesses {
         };
         let (name, mut child) = self.running.remove(index);
         if status(&mut child)?.is_none() {
-            terminate(&child);
+            send(&child, Signal::TERM);
         }
         let start = Instant::now();
-        let mut done = Ok(());
+        let (mut done, mut supported) = (Ok(()), false);
         let status = loop {
             if let Some(status) = status(&mut child)? {
                 break status;
+            }
+            if support_is_declared() && !supported {
+                supported = true;
+                send(&child, Signal::USR1);
             }
             if done.is_ok() {
                 done = poll();
@@ -197,10 +198,10 @@ impl Drop for ChildProcesses {
     }
 }
 
-fn terminate(child: &Child) {
+fn send(child: &Child, signal: Signal) {
     if let Some(pid) = i32::try_from(child.id()).ok().and_then(Pid::from_raw) {
         // Ignore errors: the process may have exited already.
-        let _ = kill_process(pid, Signal::TERM);
+        let _ = kill_process(pid, signal);
     }
 }
 
@@ -306,16 +307,21 @@ fn pidfile_path(domain: &Domain) -> PathBuf {
     domain.folder().join(format!("{}.pid", domain.prefix()))
 }
 
-/// Terminates the `supple up` of a system. Returns false if there is none.
+/// Terminates the `supple up` of a system; with `supported`, declares that its arm is supported. Returns false if there is none.
 ///
 /// # Errors
 /// [`Failure::File`].
-pub fn stop_running(domain: &Domain) -> Result<bool, Failure> {
+pub fn stop_running(domain: &Domain, supported: bool) -> Result<bool, Failure> {
     let path = pidfile_path(domain);
     let Some(process) = running(&path) else {
         return Ok(false);
     };
-    kill_process(process, Signal::TERM)
+    let declared = match supported {
+        true => kill_process(process, Signal::USR1),
+        false => Ok(()),
+    };
+    declared
+        .and_then(|()| kill_process(process, Signal::TERM))
         .map(|()| true)
         .map_err(|error| Failure::file("end the process of", &path, error.into()))
 }

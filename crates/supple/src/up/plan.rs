@@ -40,6 +40,8 @@ pub struct Plan {
     pub pendant: Option<Pendant>,
     /// Whether the arm has no brakes, so that the clock owner lays it down before it exits.
     pub lays_down: bool,
+    /// Whether the clock owner holds the arm at the end until the operator declares that it is supported.
+    pub holds_until_supported: bool,
 }
 
 /// Time after which the shutdown kills a process.
@@ -51,6 +53,7 @@ impl Plan {
     /// Time after which the shutdown kills the clock owner.
     pub fn clock_owner_timeout(&self) -> Duration {
         match self.lays_down {
+            _ if self.holds_until_supported => Duration::MAX,
             true => LAY_DOWN_TIMEOUT,
             false => SHUTDOWN_TIMEOUT,
         }
@@ -66,7 +69,7 @@ impl Plan {
     /// # Errors
     /// Options that this plant does not support: [`Failure::Injection`], [`Failure::InjectionIntoRealArm`],
     /// [`Failure::MisbehaviourWithoutMotors`], [`Failure::OptionsOfRealArm`], [`Failure::NoBus`], [`Failure::HandNeedsMode`],
-    /// [`Failure::NoDrivesForArm`], [`Failure::VirtualTimeOnRealBus`]; [`Failure::System`] if the folder of an emulated bus does not belong to this user.
+    /// [`Failure::NoDrivesForArm`], [`Failure::ArmHasBrakes`], [`Failure::VirtualTimeOnRealBus`]; [`Failure::System`] if the folder of an emulated bus does not belong to this user.
     pub fn new(
         args: &UpArgs,
         description: &Description,
@@ -81,6 +84,12 @@ impl Plan {
         }
         args.check_plant_options(description)?;
         args.check_bus_options()?;
+        let falls = args.plant != PlantKind::Sim && description.falls_without_torque();
+        if args.hold_until_supported && !falls {
+            return Err(Failure::ArmHasBrakes {
+                arm: description.name().to_owned(),
+            });
+        }
         let controller = Program {
             name: CONTROLLER,
             arguments: args.timed_arguments(domain),
@@ -113,7 +122,8 @@ impl Plan {
             clock_owner,
             arm: None,
             pendant: None,
-            lays_down: args.plant != PlantKind::Sim && description.falls_without_torque(),
+            lays_down: falls,
+            holds_until_supported: args.hold_until_supported,
         };
         if let Some(bus) = bus {
             let emulated = args.plant == PlantKind::Emu;
@@ -122,6 +132,7 @@ impl Plan {
             for (flag, given) in [
                 ("--zero-at-home", emulated || args.zero_at_home),
                 ("--tare", args.tare),
+                ("--hold-until-supported", args.hold_until_supported),
             ] {
                 clock_owner_arguments.extend(given.then(|| flag.to_owned()));
             }
@@ -179,6 +190,7 @@ impl UpArgs {
             misbehave: Vec::new(),
             plant_options: PlantArgs::default(),
             trace: None,
+            hold_until_supported: false,
             rate_hz: None,
             for_s: None,
             virtual_time: false,

@@ -333,7 +333,11 @@ impl<'a, const N: usize> System<'a, N> {
         let children = &mut self.children;
         let controller = children.end(self.plan.controller.name, SHUTDOWN_TIMEOUT, &mut drain);
         let within = self.plan.clock_owner_timeout();
-        let clock_owner = children.end(self.plan.clock_owner.name, within, &mut drain);
+        let name = self.plan.clock_owner.name;
+        if self.plan.holds_until_supported {
+            print_status("the arm is held until `supple stop --supported`");
+        }
+        let clock_owner = children.end(name, within, &mut drain);
         let drained = drain();
         if let Some(pendant) = &self.plan.pendant {
             match pendant.record() {

@@ -19,7 +19,7 @@ use supple_core::controller::Mode;
 use supple_damiao::{Frame, SpecialCommand, Status};
 use supple_drive::{
     Budget, BusPort, Command, Drive, DriveCounters, DriveState, Drives, LoopError, LossReason,
-    LoweringMode, Reading, Received, ReservedTimes, TorqueOffBehaviour,
+    LoweringMode, Reading, Received, ReservedTimes, TemperatureWarning, TorqueOffBehaviour,
 };
 
 /// Number of cycles within which all motors must confirm that they are enabled.
@@ -239,6 +239,22 @@ impl<const N: usize, B: Bus> Drive<N> for Damiao<N, B> {
             position_rad: core::array::from_fn(|joint| self.motors[joint].joint_rad()),
             tip_force: None,
         }
+    }
+
+    fn temperature_warning(&self) -> Option<TemperatureWarning> {
+        if self.power != Power::Enabled {
+            return None;
+        }
+        let motors = self.motors.iter().enumerate();
+        let warnings = motors.filter_map(|(motor, state)| {
+            let (celsius, torque_share) = state.warning()?;
+            Some(TemperatureWarning {
+                motor,
+                celsius,
+                torque_share,
+            })
+        });
+        warnings.max_by_key(|warning| warning.celsius)
     }
 
     fn state(&self) -> DriveState {

@@ -5,7 +5,7 @@ use supple_damiao::feedback::Feedback;
 use supple_damiao::guard::{MotorFault as Found, MotorGuard};
 use supple_damiao::mit::{KD, MitCodes};
 use supple_damiao::position::JointAngle;
-use supple_damiao::temperature::TemperatureLimits;
+use supple_damiao::temperature::{TemperatureLevel, TemperatureLimits};
 use supple_damiao::{Ranges, SpecialCommand, Status, TorqueShaper};
 use supple_drive::MotorFault;
 
@@ -77,6 +77,12 @@ impl MotorInCycle {
 
     pub(super) fn fault(&self) -> Option<MotorFault> {
         self.fault
+    }
+
+    /// Temperature \[degrees Celsius\], and the fraction of the torque limit that it allows, if it is above the warning limit.
+    pub(super) fn warning(&self) -> Option<(u8, f64)> {
+        let warns = self.guard.heat() != TemperatureLevel::Normal;
+        warns.then(|| (self.guard.celsius(), self.guard.torque_share()))
     }
 
     pub(super) fn sent(&self) -> Option<&CanFrame> {
