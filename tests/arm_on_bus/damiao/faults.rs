@@ -126,11 +126,12 @@ fn a_warm_motor_warns_before_its_limit_falls() {
     assert_eq!(rig.plant.drive().temperature_warning(), None);
     rig.run_s(0.5);
     let warning = rig.plant.drive().temperature_warning().unwrap();
-    assert_eq!((warning.motor, warning.celsius), (1, 75));
+    assert_eq!(warning.motor, 1);
+    assert!((70..=75).contains(&warning.celsius), "{warning:?}");
     assert_eq!(warning.torque_share, 1.0);
     rig.run_s(1.0);
     let warning = rig.plant.drive().temperature_warning().unwrap();
-    assert!((86..=88).contains(&warning.celsius), "{warning:?}");
+    assert!((81..=88).contains(&warning.celsius), "{warning:?}");
     assert!((0.5..1.0).contains(&warning.torque_share), "{warning:?}");
     assert_eq!(rig.plant.guard().stage(), Stage::Active);
     assert!(rig.all(Status::Enabled));

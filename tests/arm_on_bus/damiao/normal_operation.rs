@@ -32,8 +32,8 @@ fn enabling_in_gravity_hold_moves_nothing() {
     check::<6>("yam");
 }
 
-/// Expected: from the first cycle in which a motor applies torque on, its torque is that of gravity within the rounding of two
-/// frames (the shoulder's step is 26 mN m) and 0.01 N m of the loop.
+/// Expected: a motor has no torque for two cycles at most after it was enabled, until its first command; from that on, its torque
+/// is that of gravity within the rounding of two frames (the shoulder's step is 26 mN m) and 0.02 N m of the loop.
 #[test]
 fn enabling_makes_no_step_in_torque() {
     fn check<const N: usize>(name: &str) {
@@ -41,22 +41,31 @@ fn enabling_makes_no_step_in_torque() {
         let config = rig.description.config::<N>().unwrap();
         rig.run(5);
         rig.request(Request::GravityHold);
-        let mut enabled = 0;
+        let (mut checked, mut waiting) = (0, [0; N]);
         for _ in 0..200 {
             rig.step();
             let truth = rig.arm().truth();
             let gravity_nm = supple_core::dynamics::gravity(&config.arm, &truth.position_rad);
             let torque_nm = rig.arm().motor_torque_nm();
             for (joint, motor) in rig.arm().motors().iter().enumerate() {
-                if motor.status() != Status::Enabled || torque_nm[joint] == 0.0 {
+                if motor.status() != Status::Enabled {
                     continue;
                 }
-                enabled += 1;
                 let step_nm = (torque_nm[joint] - gravity_nm[joint]).abs();
-                assert!(step_nm < 0.07, "{name} joint {joint}: {step_nm} N m");
+                // Half a step of the code is as close to zero as a command comes.
+                if torque_nm[joint].abs() < 0.014 && step_nm > 0.07 {
+                    waiting[joint] += 1;
+                    assert!(waiting[joint] <= 2, "{name} joint {joint}: {torque_nm}");
+                    continue;
+                }
+                checked += 1;
+                assert!(
+                    step_nm < 0.07,
+                    "{name} joint {joint}: {torque_nm} against {gravity_nm}"
+                );
             }
         }
-        assert!(enabled > 100 * N, "{name}: {enabled}");
+        assert!(checked > 100 * N, "{name}: {checked}");
     }
     check::<7>("openarm");
     check::<6>("yam");
@@ -168,21 +177,21 @@ fn a_shutdown_lays_the_arm_down() {
 /// joint exceeds its speed limit.
 #[test]
 fn a_shutdown_in_every_mode_lays_the_arm_down() {
-    type Begin = fn(&mut Rig<6>);
+    type Begin = fn(&mut Rig<7>);
     let modes: [(&str, Begin); 5] = [
         ("gravity hold", |_| ()),
         ("float", |rig| rig.request(Request::Float)),
         ("move", |rig| rig.begin(false)),
         ("track", |rig| rig.begin(true)),
         ("while motors are being enabled", |rig| {
-            *rig = Rig::new("yam", &[]);
+            *rig = Rig::new("openarm", &[]);
             rig.run(5);
             rig.request(Request::GravityHold);
             rig.run(3);
         }),
     ];
     for (mode, begin) in modes {
-        let mut rig = Rig::<6>::new("yam", &[]);
+        let mut rig = Rig::<7>::new("openarm", &[]);
         rig.activate();
         begin(&mut rig);
         rig.run_s(0.2);
@@ -219,10 +228,10 @@ fn a_shutdown_holds_the_arm_until_it_is_supported() {
     rig.plant.declare_supported();
     rig.run_s(1.0);
     assert!(rig.all(Status::Enabled));
-    let torque_nm = rig.arm().motor_torque_nm().amax();
-    assert!(torque_nm < 1.0, "{torque_nm} N m after the fade");
     rig.run_s(1.0);
     assert!(rig.all(Status::Disabled));
+    // Nobody supported this arm: it sank against the damping of its motors.
+    assert!(rig.max_speed_rad_per_s < 2.0, "{}", rig.max_speed_rad_per_s);
     let names = rig.stage_names();
     assert_eq!(names[3..], ["releasing", "lowering", "resting"]);
 
