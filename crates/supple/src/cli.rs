@@ -6,7 +6,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use std::path::PathBuf;
 use supple_bus::Address;
-use supple_cli::arguments::{OfflineCommand, PlantArgs, RosArgs, UrdfArgs};
+use supple_cli::arguments::{MovedArmArgs, OfflineCommand, PlantArgs, RosArgs, UrdfArgs};
 use supple_cli::exit::CODES;
 use supple_cli::range::between;
 use supple_plant::Injection;
@@ -82,6 +82,10 @@ pub enum Command {
     /// registers; for arms with Damiao motors.
     #[command(after_help = CODES)]
     Motors(MotorsArgs),
+    /// Measure how well a model holds an arm: the drift of the tip in gravity hold, and the error of the joints under weak
+    /// stiffness, in poses of the excitation.
+    #[command(after_help = CODES)]
+    HoldCheck(HoldCheckArgs),
     /// Run many experiments on this machine or on a cluster; needs the Python package. An interrupted sweep continues.
     #[command(after_help = CODES)]
     Sweep(SweepArgs),
@@ -156,6 +160,45 @@ pub struct SystemArgs {
     /// Prefix of the system. Default: SUPPLE_PREFIX or `supple`.
     #[arg(long, value_name = "NAME")]
     pub prefix: Option<String>,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `hold-check`.
+#[derive(Clone, Debug, Args)]
+pub struct HoldCheckArgs {
+    /// The arm that moves; without --plant the simulated arm in this process.
+    #[command(flatten)]
+    pub moved: MovedArmArgs,
+    /// A built-in arm, or the path of an arm's TOML, of its folder, or of a URDF. Default: the arm of the running system with
+    /// `--plant running`, else `wam4`.
+    #[arg(long, value_name = "NAME|PATH")]
+    pub arm: Option<String>,
+    /// Reject a URDF with elements or attributes that supple does not read, instead of only warning.
+    #[arg(long)]
+    pub strict: bool,
+    /// What a URDF alone does not contain.
+    #[command(flatten)]
+    pub urdf: UrdfArgs,
+    /// Number of poses.
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::builder::RangedU64ValueParser::<usize>::new().range(1..=1000))]
+    pub poses: usize,
+    /// Time for which each pose is held, without and with stiffness (s).
+    #[arg(long = "for", value_name = "SECONDS", default_value_t = 10.0, value_parser = between(1.0, 1000.0))]
+    pub for_s: f64,
+    /// Stiffness of each joint in the second part (N m/rad). Default: that of the arm's joint impedance mode.
+    #[arg(long, value_name = "NM_PER_RAD,..", value_delimiter = ',', value_parser = between(0.0, 1e4))]
+    pub stiffness: Vec<f64>,
+    /// Folder for logs/hold-N.mcap and summary.json.
+    #[arg(long, value_name = "DIR", default_value = "out/hold-check")]
+    pub out: PathBuf,
+    /// Seed of the poses and of the simulated arm.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub seed: u64,
+    /// The simulated arm.
+    #[command(flatten)]
+    pub plant: PlantArgs,
     /// Print the result as JSON.
     #[arg(long)]
     pub json: bool,
@@ -612,6 +655,7 @@ impl Command {
             | Command::Reset(system) => system.json,
             Command::Stop(args) => args.system.json,
             Command::Motors(args) => args.json,
+            Command::HoldCheck(args) => args.json,
             Command::Sweep(args) => args.json,
             Command::Doctor { json } => *json,
             Command::Completions { .. } => false,

@@ -53,6 +53,7 @@ fn dispatch(command: &Command) -> Result<(), Failure> {
         Command::Up(args) => up::run(args),
         Command::Drill(args) => drill::run(args),
         Command::Motors(args) => motors::run(args),
+        Command::HoldCheck(args) => procedure::hold_check::run(args),
         Command::Sweep(_) => Err(sweep::exec()),
         Command::Status(system) => operate::status(system),
         Command::Mode(args) => operate::mode(args),

@@ -32,6 +32,7 @@ pub use fitting::read_excitations;
 pub use in_process::{InProcessArm, moves_joints};
 pub use motions::Motions;
 pub use progress::{FILE, FinishedStep, FitQuality, Progress, STEPS, SinusoidResult, StepName};
+pub use steps::hold_check::{HeldPose, HoldCheck, HoldCheckOptions, check_hold};
 pub use steps::single::{SingleMotion, excite_arm, track_arm};
 pub use steps::{CalibratedArm, calibrate_arm};
 pub use sweep::Sweep;

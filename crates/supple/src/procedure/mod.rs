@@ -1,10 +1,12 @@
-//! The commands that move an arm as a real one: `calibrate`, `breakaway`, `excite run` and `learn` with `--plant`.
+//! The commands that move an arm as a real one: `calibrate`, `breakaway`, `excite run` and `learn` with `--plant`, and
+//! `hold-check`.
 //!
 //! The steps are those of [`supple_experiment::procedure`]; this module starts the processes and sends requests to them.
 
 pub mod breakaway;
 pub mod calibrate;
 pub mod excite;
+pub mod hold_check;
 pub mod learn;
 mod report;
 mod running_arm;

@@ -2,6 +2,7 @@
 
 mod design;
 mod fits;
+pub mod hold_check;
 mod passes;
 pub mod single;
 mod trials;

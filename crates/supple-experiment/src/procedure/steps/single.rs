@@ -97,7 +97,7 @@ pub fn track_arm<const N: usize, A: MotionArm<N>>(
 }
 
 impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
-    fn without_progress(
+    pub(super) fn without_progress(
         arm: &'a mut A,
         start: &'a Description,
         options: &'a ProcedureOptions,

@@ -1,0 +1,228 @@
+//! How well a model holds an arm: its drift in gravity hold, and its error under weak joint stiffness, in poses of the excitation.
+
+use super::{GAINS_S, ModelStage, Run, config};
+use crate::excite::move_to;
+use crate::procedure::arm::{Motion, MotionArm};
+use crate::procedure::motions::Motions;
+use crate::procedure::sweep::Sweep;
+use crate::procedure::{Operator, ProcedureOptions};
+use crate::request_sequence::Step;
+use serde::Serialize;
+use supple_core::config::{JointGains, Role};
+use supple_core::controller::Request;
+use supple_core::dynamics::tip_pose;
+use supple_core::{Config, Vector};
+use supple_model::Description;
+
+/// Time at the end over which angles are averaged \[s\].
+const MEAN_S: f64 = 0.5;
+/// Time in which weak stiffness takes over from the move \[s\].
+const HANDOVER_S: f64 = 1.0;
+
+/// Options of the check.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HoldCheckOptions<const N: usize> {
+    /// Number of poses.
+    pub poses: usize,
+    /// Time for which each pose is held, without and with stiffness \[s\].
+    pub hold_s: f64,
+    /// Gains of the joints; their stiffness is that of the second part.
+    pub gains: JointGains<N>,
+}
+
+/// How a pose was held.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HeldPose {
+    /// Pose \[rad\].
+    pub position_rad: Vec<f64>,
+    /// Distance by which the tip drifts in gravity hold, by the encoders \[m\]; `None` if a fault ended it.
+    pub tip_drift_m: Option<f64>,
+    /// Distance of each joint from the pose under stiffness, at the end \[rad\]; empty if a fault ended it.
+    pub joint_error_rad: Vec<f64>,
+    /// The fault that ended the pose.
+    pub ended: Option<String>,
+}
+
+/// Result of the check.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct HoldCheck {
+    /// Name of the arm.
+    pub arm: String,
+    /// Names of the joints.
+    pub joints: Vec<String>,
+    /// Time for which each pose was held, without and with stiffness \[s\].
+    pub hold_s: f64,
+    /// Stiffness of the joints \[N m/rad\].
+    pub stiffness_nm_per_rad: Vec<f64>,
+    /// The poses.
+    pub poses: Vec<HeldPose>,
+    /// Time in modes that move joints \[s\].
+    pub moved_s: f64,
+}
+
+impl HoldCheck {
+    /// Greatest drift of the tip in gravity hold \[m\]; `None` without a pose that was held to the end.
+    pub fn worst_drift_m(&self) -> Option<f64> {
+        let drifts = self.poses.iter().filter_map(|pose| pose.tip_drift_m);
+        drifts.reduce(f64::max)
+    }
+
+    /// Greatest error of each joint under stiffness \[rad\].
+    pub fn worst_error_rad(&self) -> Vec<f64> {
+        let of_joint = |joint: usize| {
+            let errors = self.poses.iter();
+            let errors = errors.filter_map(|pose| pose.joint_error_rad.get(joint));
+            errors.copied().fold(0.0, f64::max)
+        };
+        (0..self.joints.len()).map(of_joint).collect()
+    }
+
+    /// Number of poses that a fault ended.
+    pub fn faults(&self) -> usize {
+        self.poses
+            .iter()
+            .filter(|pose| pose.ended.is_some())
+            .count()
+    }
+}
+
+/// Moves an arm with the model `start` to poses of its excitation. Each is held in gravity hold, then by joint impedance with the
+/// stiffness of `check`. The operator confirms the swept space before. There is one log for each pose, `logs/hold-<number>.mcap`.
+///
+/// # Errors
+/// [`crate::procedure::ProcedureError`] with the remedy, and the errors of the arm. A fault in a pose ends this pose only.
+pub fn check_hold<const N: usize, A: MotionArm<N>>(
+    arm: &mut A,
+    start: &Description,
+    check: &HoldCheckOptions<N>,
+    options: &ProcedureOptions,
+    operator: &mut dyn Operator,
+) -> Result<HoldCheck, A::Error> {
+    let mut run = Run::without_progress(arm, start, options, operator)?;
+    let motions = run.design(ModelStage::Given)?;
+    let model = config::<N>(start)?;
+    let poses = poses(&model, &run.home_rad, &motions, check.poses);
+    run.ensure_model(ModelStage::Given)?;
+    let from_rad = run.arm.position_rad()?;
+    let minutes = poses.len() as f64 * (2.0 * check.hold_s + 6.0) / 60.0;
+    run.report(&format!(
+        "{} poses follow, about {minutes:.0} minutes",
+        poses.len()
+    ));
+    run.confirm_sweep(&Sweep::of_poses(&model, &from_rad, &poses, &run.home_rad))?;
+    let mut held = Vec::with_capacity(poses.len());
+    for (number, pose_rad) in poses.iter().enumerate() {
+        run.report(&format!("pose {} of {}", number + 1, poses.len()));
+        held.push(run.held_pose(&model, &format!("hold-{}", number + 1), pose_rad, check)?);
+    }
+    run.home("home")?;
+    Ok(HoldCheck {
+        arm: start.name().to_owned(),
+        joints: start.joint_names().to_vec(),
+        hold_s: check.hold_s,
+        stiffness_nm_per_rad: check.gains.stiffness_nm_per_rad.as_slice().to_vec(),
+        poses: held,
+        moved_s: run.progress.moved_s,
+    })
+}
+
+impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
+    fn held_pose(
+        &mut self,
+        model: &Config<N>,
+        name: &str,
+        pose_rad: &Vector<N>,
+        check: &HoldCheckOptions<N>,
+    ) -> Result<HeldPose, A::Error> {
+        let from_rad = self.arm.position_rad()?;
+        let recorded = |request, duration_s| Step {
+            recorded: true,
+            ..Step::wait(request, duration_s)
+        };
+        let gains = Request::JointGains {
+            gains: check.gains,
+            ramp_s: 0.5 * GAINS_S,
+        };
+        let impedance = Request::JointImpedance {
+            target_rad: *pose_rad,
+            duration_s: HANDOVER_S,
+        };
+        let steps = [
+            move_to(&self.limits, pose_rad, &from_rad),
+            recorded(Request::GravityHold, check.hold_s),
+            move_to(&self.limits, pose_rad, pose_rad),
+            Step::wait(gains, GAINS_S),
+            recorded(impedance, HANDOVER_S + check.hold_s),
+        ];
+        let performed = self.arm.perform(name, &steps)?;
+        self.progress.moved_s += performed.moved_s;
+        let ended = performed.stopped.map(|stopped| stopped.fault);
+        if ended.is_some() {
+            self.arm.recover()?;
+        }
+        // A fault ends the last motion early.
+        let complete =
+            performed.motions.len() - usize::from(ended.is_some()).min(performed.motions.len());
+        let motions = &performed.motions[..complete];
+        Ok(HeldPose {
+            position_rad: pose_rad.as_slice().to_vec(),
+            tip_drift_m: motions.first().map(|motion| tip_drift_m(model, motion)),
+            joint_error_rad: motions.get(1).map_or_else(Vec::new, |motion| {
+                let end_rad = mean_rad::<N>(motion, true, model.period_s);
+                (end_rad - pose_rad).abs().as_slice().to_vec()
+            }),
+            ended,
+        })
+    }
+}
+
+/// Returns poses of the excitations at equal distances in time; held joints stay in the home pose.
+fn poses<const N: usize>(
+    config: &Config<N>,
+    home_rad: &Vector<N>,
+    motions: &Motions<N>,
+    count: usize,
+) -> Vec<Vector<N>> {
+    let whole_s: f64 = motions.full.iter().map(|series| series.duration_s).sum();
+    let at = |mut time_s: f64| {
+        for series in &motions.full {
+            if time_s <= series.duration_s {
+                return series.at(time_s).position_rad;
+            }
+            time_s -= series.duration_s;
+        }
+        *home_rad
+    };
+    let times = (0..count).map(|k| whole_s * (k as f64 + 0.5) / count as f64);
+    times
+        .map(at)
+        .map(|pose_rad| {
+            Vector::from_fn(|joint, _| match config.roles[joint] {
+                Role::Held { .. } => home_rad[joint],
+                Role::Active => pose_rad[joint],
+            })
+        })
+        .collect()
+}
+
+/// Returns the mean angles over the first or the last [`MEAN_S`] of a motion.
+fn mean_rad<const N: usize>(motion: &Motion, last: bool, period_s: f64) -> Vector<N> {
+    let q = &motion.recording.q_rad;
+    let count = ((MEAN_S / period_s) as usize).clamp(1, q.nrows().max(1));
+    let first = if last {
+        q.nrows().saturating_sub(count)
+    } else {
+        0
+    };
+    let rows = q.rows(first, count.min(q.nrows()));
+    Vector::from_fn(|joint, _| rows.column(joint).mean())
+}
+
+/// Returns the distance of the tip between the beginning and the end of a motion \[m\].
+fn tip_drift_m<const N: usize>(model: &Config<N>, motion: &Motion) -> f64 {
+    let tip_m = |last| {
+        let position_rad = mean_rad::<N>(motion, last, model.period_s);
+        tip_pose(&model.arm, &position_rad).translation
+    };
+    (tip_m(true) - tip_m(false)).norm()
+}
