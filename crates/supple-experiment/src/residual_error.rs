@@ -41,7 +41,7 @@ const REVERSAL_SHARE: f64 = 0.004;
 /// Range of a joint's angles in the sinusoid below which it rests; friction then holds it where it is.
 const ASKED_RAD: f64 = 0.01;
 /// Upper and lower bound relative to the estimate; the error at reversals is added to the upper bound, as squares.
-const UPPER_FACTOR: f64 = 1.2;
+const UPPER_FACTOR: f64 = 1.16;
 const LOWER_FACTOR: f64 = 0.1;
 
 /// Message if there is no interval.
