@@ -31,7 +31,11 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         self.report("design of the excitation");
         let home_rad = self.home_rad;
         let config = config::<N>(&self.model(stage)?)?;
-        let unknown = stage == ModelStage::Start || self.progress.first_fit.is_none();
+        let unknown = match stage {
+            ModelStage::Start => true,
+            ModelStage::Given => false,
+            ModelStage::First | ModelStage::Identified => self.progress.first_fit.is_none(),
+        };
         let plan = DesignPlan {
             seed: self.options.seed,
             candidates: self.options.candidates,
