@@ -446,6 +446,9 @@ pub struct CalibrateArgs {
     /// Duration of the warm-up (s).
     #[arg(long, value_name = "S", default_value_t = 7.0, requires = "on", value_parser = between(0.0, 3600.0))]
     pub warm_up: f64,
+    /// Run at constant speeds, for torque ripple, also on an arm that falls without torque; others always do.
+    #[arg(long, requires = "on")]
+    pub ripple_runs: bool,
     /// Number of candidates of the design of the excitation.
     #[arg(
         long,

@@ -31,6 +31,10 @@ const LINE_POSES: usize = 40;
 const POSES: usize = 400;
 /// Maximum joint speed \[rad/s\] and period \[s\] of slow motion.
 const SLOW: (f64, f64) = (0.1, 40.0);
+/// The same period for an arm that falls without torque.
+const SLOW_OF_FALLING_S: f64 = 25.0;
+/// Share of the joint speeds that designs for such an arm use: the loop with the model of a first fit overshoots.
+const SPEED_SHARE_OF_FALLING: f64 = 0.85;
 /// Speeds of the runs at constant speed \[rad/s\], and the period of each \[s\].
 const CONSTANT: ([f64; 2], f64) = ([0.06, 0.12], 25.0);
 /// Seed of the validation motion, relative to that of the excitation.
@@ -58,7 +62,7 @@ pub struct Motions<const N: usize> {
     pub full: Vec<Fourier<N>>,
     /// Slow motion, for dry friction.
     pub slow: Fourier<N>,
-    /// Motion at constant speeds, for torque ripple.
+    /// Motion at constant speeds, for torque ripple; none if it is not identified.
     pub constant: Vec<Fourier<N>>,
     /// Another excitation, for validation.
     pub validation: Fourier<N>,
@@ -73,8 +77,11 @@ pub struct DesignPlan {
     pub seed: u64,
     /// Number of candidates of each design.
     pub candidates: usize,
-    /// Whether gravity may need much of the torque limits, so that slow motion is about the light pose instead of home.
-    pub about_light_pose: bool,
+    /// Whether the arm falls without torque: gravity may need much of its torque limits, so that slow motion is about the light pose
+    /// instead of home.
+    pub falls: bool,
+    /// Whether torque ripple is identified.
+    pub ripple: bool,
     /// Whether motors may give a share of the commanded torque only.
     pub careful: bool,
 }
@@ -92,6 +99,9 @@ impl<const N: usize> Motions<N> {
         let mut config = *config;
         if plan.careful {
             config.limits.joint_torque_nm *= CAREFUL_SHARE;
+        }
+        if plan.falls {
+            config.limits.joint_speed_rad_per_s *= SPEED_SHARE_OF_FALLING;
         }
         let config = &config;
         let (seed, candidates) = (plan.seed, plan.candidates);
@@ -115,19 +125,20 @@ impl<const N: usize> Motions<N> {
             (candidates / 10).max(20),
         )?;
         let light_rad = light_pose(config, &full);
-        let centre_rad = if plan.about_light_pose {
-            &light_rad
-        } else {
-            home_rad
-        };
-        let fitting = |series: Fourier<N>| match plan.about_light_pose {
+        let centre_rad = if plan.falls { &light_rad } else { home_rad };
+        let fitting = |series: Fourier<N>| match plan.falls {
             true => within_torque(config, series),
             false => series,
         };
         let (speeds, constant_s) = CONSTANT;
         let run = |speed| constant_speed_series(config, centre_rad, &joints, speed, constant_s);
-        let constant: Result<Vec<_>, IdentError> = speeds.into_iter().map(run).collect();
+        let speeds = speeds.into_iter().filter(|_| plan.ripple);
+        let constant: Result<Vec<_>, IdentError> = speeds.map(run).collect();
         let (speed_rad_per_s, slow_period_s) = SLOW;
+        let slow_period_s = match plan.falls {
+            true => SLOW_OF_FALLING_S,
+            false => slow_period_s,
+        };
         let slow = slow_series(config, centre_rad, &joints, speed_rad_per_s, slow_period_s)?;
         let first = if plan.careful {
             FIRST_OF_CAREFUL

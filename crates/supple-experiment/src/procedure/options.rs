@@ -38,6 +38,8 @@ pub struct ProcedureOptions {
     pub candidates: usize,
     /// Duration of the warm-up \[s\].
     pub warm_up_s: f64,
+    /// Whether an arm that falls without torque also runs at constant speeds, for torque ripple; others always do.
+    pub ripple_runs: bool,
     /// Whether to continue after the last finished step.
     pub resume: bool,
     /// The last step to perform; `None` for all.
@@ -52,6 +54,7 @@ impl ProcedureOptions {
             seed: 0,
             candidates: 600,
             warm_up_s: 7.0,
+            ripple_runs: false,
             resume: false,
             until: None,
         }

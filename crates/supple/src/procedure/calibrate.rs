@@ -52,6 +52,7 @@ pub fn run(args: &CalibrateArgs, on: CalibrationPlant) -> Result<(), Failure> {
     };
     let options = ProcedureOptions {
         warm_up_s: args.warm_up,
+        ripple_runs: args.ripple_runs,
         candidates: args.candidates,
         resume: args.resume,
         until: args.until,

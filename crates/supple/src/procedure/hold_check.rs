@@ -36,7 +36,7 @@ impl<const N: usize> Work<N> for Check<'_> {
         let mut gains = model.joint_gains;
         if !self.args.stiffness.is_empty() {
             let stiffness = Vector::from_column_slice(&self.args.stiffness);
-            gains = with_damping_ratio(&gains, stiffness);
+            gains = with_stiffness(&gains, stiffness, &model.hold_damping_nm_s_per_rad);
         }
         let check = HoldCheckOptions {
             poses: self.args.poses,
@@ -47,10 +47,11 @@ impl<const N: usize> Work<N> for Check<'_> {
     }
 }
 
-/// Returns gains of this stiffness with the damping ratios of `gains`.
-fn with_damping_ratio<const N: usize>(
+/// Returns gains of this stiffness with the damping ratios of `gains`, and at most the damping of gravity hold, which the loop allows.
+fn with_stiffness<const N: usize>(
     gains: &JointGains<N>,
     stiffness_nm_per_rad: Vector<N>,
+    hold_damping_nm_s_per_rad: &Vector<N>,
 ) -> JointGains<N> {
     let damping_nm_s_per_rad = Vector::from_fn(|joint, _| {
         let usual = gains.stiffness_nm_per_rad[joint];
@@ -59,7 +60,7 @@ fn with_damping_ratio<const N: usize>(
         } else {
             1.0
         };
-        gains.damping_nm_s_per_rad[joint] * factor
+        (gains.damping_nm_s_per_rad[joint] * factor).min(hold_damping_nm_s_per_rad[joint])
     });
     JointGains {
         stiffness_nm_per_rad,

@@ -17,6 +17,11 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         self.start.falls_without_torque()
     }
 
+    /// Returns whether torque ripple is identified: if asked, or if the arm does not fall without torque.
+    fn identifies_ripple(&self) -> bool {
+        self.options.ripple_runs || !self.falls_without_torque()
+    }
+
     /// Returns the via pose of moves that need much torque, if the arm falls without torque.
     pub(super) fn via_pose(&self, stage: ModelStage) -> Result<Option<ViaPose<N>>, ProcedureError> {
         let Some(light_rad) = self.light_rad else {
@@ -39,7 +44,8 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         let plan = DesignPlan {
             seed: self.options.seed,
             candidates: self.options.candidates,
-            about_light_pose: self.falls_without_torque(),
+            falls: self.falls_without_torque(),
+            ripple: self.identifies_ripple(),
             careful: self.falls_without_torque() && unknown,
         };
         let work = move || Motions::design(&config, &home_rad, &plan);

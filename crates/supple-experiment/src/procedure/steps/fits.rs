@@ -68,6 +68,8 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         let file = |step| self.log_file(step);
         let [full, slow] = [StepName::FullPass, StepName::SlowMotion].map(file);
         let [first, constant] = [StepName::FirstPass, StepName::ConstantSpeed].map(file);
+        let constant_speed = self.progress.finished(StepName::ConstantSpeed);
+        let has_constant = constant_speed.is_some_and(|finished| finished.log.is_some());
         let validation = self.log_file(StepName::ValidationMotion);
         let start = self.start.clone();
         // Reading and fitting take long; the arm's telemetry must be read meanwhile.
@@ -79,7 +81,10 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             for file in [&full, &slow, &validation] {
                 others.extend(fitting::read_position_controlled_motions::<N>(file)?);
             }
-            let constant = fitting::read_excitations::<N>(&constant)?;
+            let constant = match has_constant {
+                true => fitting::read_excitations::<N>(&constant)?,
+                false => Vec::new(),
+            };
             let validation = single_log(
                 &fitting::read_excitations::<N>(&validation)?,
                 "validation-motion",

@@ -77,7 +77,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         Ok(self.finish(StepName::Breakaway, before_s, None)?)
     }
 
-    /// Performs the step that follows `series`, and records its log.
+    /// Performs the step that follows `series`, and records its log; without series the step is finished without motion.
     pub(super) fn series(
         &mut self,
         step: StepName,
@@ -85,6 +85,9 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         stage: ModelStage,
         series: &[Fourier<N>],
     ) -> Result<(), A::Error> {
+        if series.is_empty() && self.progress.finished(step).is_none() {
+            return Ok(self.finish(step, self.progress.moved_s, None)?);
+        }
         let duration_s: f64 = series.iter().map(|series| series.duration_s).sum();
         if self.is_done(
             step,
