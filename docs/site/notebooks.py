@@ -43,6 +43,8 @@ def main() -> int:
     chosen = [path.resolve() for path in arguments.notebooks] or sorted(FOLDER.glob("*.ipynb"))
     os.environ["PATH"] = f"{arguments.programs.resolve()}{os.pathsep}{os.environ['PATH']}"
     os.environ["SUPPLE_CHECKOUT"] = str(ROOT)
+    # Pages have no progress bars.
+    os.environ["TQDM_DISABLE"] = "1"
     with ThreadPoolExecutor(2) as pool:
         problems = [problem for problem in pool.map(lambda path: built(path, arguments.out), chosen) if problem]
     print("\n".join([*problems, f"{len(chosen)} notebooks run, {len(problems)} failed"]))

@@ -51,7 +51,7 @@ def _fail(error: object, code: int) -> int:
 def _run(spec: Spec, options: argparse.Namespace) -> Sweep[dict[str, object], dict[str, object]]:
     distributed: Any = importlib.import_module("distributed")
     tasks = spec.tasks()
-    report = None if options.quiet else _progress()
+    report = False if options.quiet else _progress()
     if options.scheduler:
         with distributed.Client(options.scheduler) as client:
             executor = client.get_executor()

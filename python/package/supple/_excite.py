@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from supple import _check, _native
 from supple._check import flag, integer, number
 from supple._plant import PlantOptions, _chosen
+from supple._progress import bar, elapsed, split
 
 Array = NDArray[np.float64]
 
@@ -68,7 +69,7 @@ def design_excitation(
     candidates: int = 3000,
     seed: int = 0,
     rate_hz: float = 100.0,
-    progress: Callable[[int, float], object] | None = None,
+    progress: Callable[[int, float], object] | bool | None = None,
 ) -> Excitation:
     """Design an exciting trajectory within the arm's limits of angle, speed, torque and workspace.
 
@@ -93,8 +94,9 @@ def design_excitation(
         Seed of the search, zero or more.
     rate_hz : float
         Rate of the arrays of the result (Hz).
-    progress : callable, optional
-        Called as ``progress(tried, best)``; an exception stops the search.
+    progress : callable or bool, optional
+        Called as ``progress(tried, best)``; an exception stops the search. True shows a bar (needs tqdm), False none. Default: a
+        bar in a terminal or a notebook, if tqdm is installed and the search takes more than a second.
 
     Returns
     -------
@@ -128,22 +130,25 @@ def design_excitation(
     if workspace is not None:
         lower, upper = _check.array("workspace", workspace, (2, 3))
         box = (lower.tolist(), upper.tolist())
-    if progress is not None:
-        _check.function("progress", progress)
-    found = _native.design_excitation(
-        arm,
-        {
-            "moving": list(range(arm.dof)) if moving is None else _check.integers("moving", moving),
-            "period_s": period_s,
-            "periods": periods,
-            "d_optimality": criterion == "d-optimality",
-            "workspace": box,
-            "candidates": candidates,
-            "seed": seed,
-            "rate_hz": rate_hz,
-        },
-        progress,
-    )
+    if progress is not None and not isinstance(progress, bool):
+        _check.function("progress", progress, "a callable, True or False")
+    shows, given_report = split(progress)
+    with bar("design", "candidate", candidates, shows) as show:
+        report = given_report if show is None else lambda tried, best: show(tried)
+        found = _native.design_excitation(
+            arm,
+            {
+                "moving": list(range(arm.dof)) if moving is None else _check.integers("moving", moving),
+                "period_s": period_s,
+                "periods": periods,
+                "d_optimality": criterion == "d-optimality",
+                "workspace": box,
+                "candidates": candidates,
+                "seed": seed,
+                "rate_hz": rate_hz,
+            },
+            report,
+        )
     return Excitation(_series=found.pop("series"), **found)
 
 
@@ -158,6 +163,7 @@ def excite(
     log_dir: str | os.PathLike[str] | None = None,
     plant_options: PlantOptions | None = None,
     realistic: bool = False,
+    progress: bool | None = None,
 ) -> Recording:
     """Let the simulated arm track an excitation and return its recorded data.
 
@@ -183,6 +189,9 @@ def excite(
         none.
     realistic : bool
         All effects of a real arm, each of modest size: the realistic set of the arm, see :func:`plant_options`.
+    progress : bool, optional
+        Whether to show the elapsed time (needs tqdm). Default: in a terminal or a notebook, if tqdm is installed and the call takes
+        more than a second.
 
     Returns
     -------
@@ -213,20 +222,23 @@ def excite(
         encoder_noise_rad = number("encoder_noise_rad", encoder_noise_rad)
     seed = integer("seed", seed)
     load = flag("load", load)
+    if progress is not None:
+        progress = flag("progress", progress)
     if excitation.q.shape[1] != arm.dof:
         raise ValueError(
             f"excitation: expected {arm.dof} joints, as arm, got {excitation.q.shape[1]}"
         )
-    found = _native.excite(
-        arm,
-        arm if model is None else model,
-        excitation._series,
-        {
-            "encoder_noise_rad": encoder_noise_rad,
-            "load": load,
-            "seed": seed,
-            "log_dir": None if log_dir is None else _check.path("log_dir", log_dir),
-            "plant_options": _chosen(arm, plant_options, realistic),
-        },
-    )
+    with elapsed("excitation", progress):
+        found = _native.excite(
+            arm,
+            arm if model is None else model,
+            excitation._series,
+            {
+                "encoder_noise_rad": encoder_noise_rad,
+                "load": load,
+                "seed": seed,
+                "log_dir": None if log_dir is None else _check.path("log_dir", log_dir),
+                "plant_options": _chosen(arm, plant_options, realistic),
+            },
+        )
     return Recording(torque_delay_s=1.5 * found.pop("period_s"), **found)

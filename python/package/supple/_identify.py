@@ -15,6 +15,7 @@ from supple import _check, _native
 from supple._check import flag, integer, number
 from supple._fit import Fit
 from supple._log_input import log_inputs
+from supple._progress import elapsed
 
 __all__ = ["DataWarning", "FrictionColumns", "identify"]
 
@@ -91,6 +92,7 @@ def identify(
     joint_noise_nm: ArrayLike | None = None,
     effects: Literal["auto", "none"] = "none",
     accept_wrong_logs: bool = False,
+    progress: bool | None = None,
 ) -> Fit:
     """Identify an arm from one or several logs.
 
@@ -154,6 +156,9 @@ def identify(
     accept_wrong_logs : bool
         Whether to fit a log although its checks against ``arm`` found an error (units, signs, order, zeros,
         clock); what they found is then a warning.
+    progress : bool, optional
+        Whether to show the elapsed time (needs tqdm). Default: in a terminal or a notebook, if tqdm is installed and the call takes
+        more than a second.
 
     Returns
     -------
@@ -208,27 +213,28 @@ def identify(
     if cutoff_hz is None:
         cutoff_hz = inf if qdd is not None else 8.0
     has_filter = np.ndim(cutoff_hz) > 0 or cutoff_hz != inf
-    native, result_warnings = _native.identify(
-        arm,
-        log_inputs(t, q, tau, qd, qdd),
-        {
-            "moving": None if moving is None else _check.integers("moving", moving),
-            "couplings": _pairs(coupling),
-            "rate_hz": _optional("rate_hz", rate_hz),
-            "cutoff_hz": number("cutoff_hz", cutoff_hz, signed=True) if has_filter else None,
-            "keep_every": integer("keep_every", keep_every),
-            "torque_delay_s": _optional("torque_delay_s", torque_delay_s),
-            "find_stribeck": find_stribeck,
-            "method": _check.text("method", method),
-            "friction": columns,
-            "effects": effects == "auto",
-            "rotor": flag("rotor", rotor),
-            "slow_rad_per_s": number("slow_rad_per_s", slow_rad_per_s, signed=True),
-            "prior_weight": _optional("prior_weight", prior_weight),
-            "accept_wrong_logs": flag("accept_wrong_logs", accept_wrong_logs),
-            "joint_noise_nm": _noise(joint_noise_nm),
-        },
-    )
+    if progress is not None:
+        progress = flag("progress", progress)
+    logs = log_inputs(t, q, tau, qd, qdd)
+    options = {
+        "moving": None if moving is None else _check.integers("moving", moving),
+        "couplings": _pairs(coupling),
+        "rate_hz": _optional("rate_hz", rate_hz),
+        "cutoff_hz": number("cutoff_hz", cutoff_hz, signed=True) if has_filter else None,
+        "keep_every": integer("keep_every", keep_every),
+        "torque_delay_s": _optional("torque_delay_s", torque_delay_s),
+        "find_stribeck": find_stribeck,
+        "method": _check.text("method", method),
+        "friction": columns,
+        "effects": effects == "auto",
+        "rotor": flag("rotor", rotor),
+        "slow_rad_per_s": number("slow_rad_per_s", slow_rad_per_s, signed=True),
+        "prior_weight": _optional("prior_weight", prior_weight),
+        "accept_wrong_logs": flag("accept_wrong_logs", accept_wrong_logs),
+        "joint_noise_nm": _noise(joint_noise_nm),
+    }
+    with elapsed("identification", progress):
+        native, result_warnings = _native.identify(arm, logs, options)
     for warning in result_warnings:
         warnings.warn(warning, DataWarning, stacklevel=2)
     report = native.report()

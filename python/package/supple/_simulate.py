@@ -15,6 +15,7 @@ from supple import _check, _native
 from supple._check import flag, integer, number
 from supple._frames import Tabular
 from supple._plant import PlantOptions, _chosen
+from supple._progress import elapsed
 
 Array = NDArray[np.float64]
 EXPERIMENTS = ("sinusoid", "arc", "quadrant", "probing")
@@ -81,6 +82,7 @@ def simulate(
     log_dir: str | os.PathLike[str] | None = None,
     plant_options: PlantOptions | None = None,
     realistic: bool = False,
+    progress: bool | None = None,
 ) -> Run:
     """Run one of the paper's experiments on the simulated arm, in virtual time.
 
@@ -127,6 +129,9 @@ def simulate(
         none.
     realistic : bool
         All effects of a real arm, each of modest size: the realistic set of the arm, see :func:`plant_options`.
+    progress : bool, optional
+        Whether to show the elapsed time (needs tqdm). Default: in a terminal or a notebook, if tqdm is installed and the call takes
+        more than a second.
 
     Returns
     -------
@@ -169,29 +174,32 @@ def simulate(
         _check.arm("model", model)
         if gravity_error or friction_error:
             raise ValueError("gravity_error, friction_error: expected 0 if model is given")
+    if progress is not None:
+        progress = flag("progress", progress)
     effects = _chosen(arm, plant_options, realistic)
     folder = None if log_dir is None else _check.path("log_dir", log_dir)
     if folder is not None:
         Path(folder).mkdir(parents=True, exist_ok=True)
-    result = _native.simulate(
-        arm,
-        model,
-        {
-            "experiment": experiment,
-            "stiffness_n_per_m": stiffness_n_per_m,
-            "speed": speed,
-            "duration_s": duration_s,
-            "gravity_error": gravity_error,
-            "friction_error": friction_error,
-            "stribeck": stribeck,
-            "load": load,
-            "fade": fade,
-            "learning": learning,
-            "seed": seed,
-            "log_dir": folder,
-            "plant_options": effects,
-        },
-    )
+    with elapsed(experiment, progress):
+        result = _native.simulate(
+            arm,
+            model,
+            {
+                "experiment": experiment,
+                "stiffness_n_per_m": stiffness_n_per_m,
+                "speed": speed,
+                "duration_s": duration_s,
+                "gravity_error": gravity_error,
+                "friction_error": friction_error,
+                "stribeck": stribeck,
+                "load": load,
+                "fade": fade,
+                "learning": learning,
+                "seed": seed,
+                "log_dir": folder,
+                "plant_options": effects,
+            },
+        )
     cycles = result["cycles"]
     in_contact = cycles.pop("in_contact").astype(bool)
     return Run(

@@ -13,7 +13,7 @@ import numpy as np
 from supple import _check
 from supple._check import integer
 from supple._frames import table
-from supple._progress import bar
+from supple._progress import bar, split
 from supple._results import Results
 
 if TYPE_CHECKING:
@@ -122,7 +122,8 @@ def sweep(
         Executor of the tasks, such as ``distributed.Client.get_executor()``. Default: run in this
         thread, in order.
     progress : callable or bool, optional
-        Called as ``progress(done, total)`` after each task; True shows a bar (needs tqdm).
+        Called as ``progress(done, total)`` after each task. True shows a bar (needs tqdm), False none. Default: a bar in a terminal
+        or a notebook, if tqdm is installed and the sweep takes more than a second.
     results : path, optional
         Folder for the results, Parquet, a row for each task with its seed (needs pyarrow). Tasks that it has are not run
         again: a sweep that was ended goes on, and one with more parameters runs the new ones. A task that fails is listed
@@ -162,15 +163,28 @@ def sweep(
         _check.function("progress", progress, "a callable, True or False")
     if results is not None:
         results = _check.path("results", results)
-    report = bar("sweep") if progress is True else progress or None
     given = tuple(parameters)
     seeds = tuple(
         int(child.generate_state(1, np.uint64)[0] >> np.uint64(1))
         for child in np.random.SeedSequence(seed).spawn(len(given))
     )
-    if results is not None:
-        store = Results(results, _name(function))
-        return _stored(function, given, seeds, executor, report, store)
+    store = None if results is None else Results(results, _name(function))
+    shows, given_report = split(progress)
+    with bar("sweep", "task", len(given), shows) as show:
+        report = given_report if show is None else lambda done, total: show(done)
+        if store is not None:
+            return _stored(function, given, seeds, executor, report, store)
+        return _run(function, given, seeds, executor, report)
+
+
+def _run(
+    function: Callable[[P, int], R],
+    given: tuple[P, ...],
+    seeds: tuple[int, ...],
+    executor: Executor | None,
+    report: Callable[[int, int], object] | None,
+) -> Sweep[P, R]:
+    """Runs a sweep without stored results; the first failure is raised."""
     found: list[R] = []
     if executor is None:
         try:
@@ -223,7 +237,7 @@ def _stored(
     given: tuple[P, ...],
     seeds: tuple[int, ...],
     executor: Executor | None,
-    report: Callable[[int, int], None] | None,
+    report: Callable[[int, int], object] | None,
     store: Results,
 ) -> Sweep[P, R]:
     """Runs a sweep like :func:`sweep` and stores the results in a folder."""
