@@ -249,6 +249,32 @@ def path_time(t, ramp_s):
     return ramp_s * x**4 * (2.5 + x * (x - 3.0))
 
 
+def test_the_torque_reflects_gains_at_once_and_a_set_point_in_the_next_cycle():
+    def torques(act=None):
+        system = supple.simulated(supple.Arm.load("wam4"), stiffness_n_per_m=20.0)
+        system.hold()
+        # At a distance from its reference the tip has a spring force, which the gains change.
+        system.line(system.state.tip_position_m + [0.0, 0.0, 0.05], 1.0)
+        with system.set_points(100.0, lead_s=0.02) as points:
+            system.wait(0.1)
+            before = system.state
+            if act is not None:
+                act(system, points, before.reference_position_m)
+            system.wait(0.1)
+        rows = system.recent(1.0)
+        requests = rows.cycle[(rows.columns["request"] != 0.0) & (rows.cycle > before.cycle)]
+        return dict(zip(rows.cycle.tolist(), rows.tau.tolist(), strict=True)), requests
+
+    without, _ = torques()
+    for act, later in (
+        (lambda system, points, reference: system.gains(stiffness_n_per_m=25.0, ramp_s=0.0), 0),
+        (lambda system, points, reference: points.send(reference + along_y(5e-5), pace=False), 1),
+    ):
+        changed, (request,) = torques(act)
+        differs = [cycle for cycle in sorted(changed.keys() & without.keys()) if changed[cycle] != without[cycle]]
+        assert differs[0] == request + later
+
+
 def test_silence_ends_at_rest(system):
     start = system.state.tip_position_m
     with system.set_points(100.0) as points:
