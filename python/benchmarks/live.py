@@ -9,7 +9,8 @@ the other: the controller's own trajectory; positions alone, streamed at 100 Hz;
 streamed. Before each, the joints move to the same pose and the tip rests at the centre. Runs are aligned by the lag in whole
 cycles at which their references differ least, and the tips are compared cycle by cycle. Every streamed run is compared with every
 run of the controller's own trajectory, and these with each other, which is the repeatability. The tip is that of the
-controller, from the encoders.
+controller, from the encoders. When the host is busy the drive gets no torque in some cycles, which disturbs every kind of run: the
+missed cycles are counted. So the same runs follow on a system inside the process, where time waits for the program.
 
 latency: calls at random phases of the cycle, gains and set-points by turns. The time is from just before the call in Python to
 the end of the controller's step in the first cycle
@@ -145,12 +146,13 @@ def sinusoid(t_s: float) -> tuple[Array, Array, Array]:
 
 
 class Recorder:
-    """Collects every cycle in a thread, over a connection of its own."""
+    """Collects every cycle: of a running system in a thread, over a connection of its own."""
 
-    def __init__(self, prefix: str) -> None:
+    def __init__(self, system: supple.System) -> None:
+        self._system = system
         self._blocks: list[supple.States] = []
         self._ended = threading.Event()
-        self._watching = supple.connect(prefix, watch=True)
+        self._watching = supple.connect(system.prefix, watch=True) if system.is_live else None
         self._thread = threading.Thread(target=self._collect)
 
     def __enter__(self) -> Recorder:
@@ -158,11 +160,20 @@ class Recorder:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self.read()
         self._ended.set()
         self._thread.join()
-        self._watching.close()
+        if self._watching is not None:
+            self._watching.close()
+
+    def read(self) -> None:
+        """Reads what a system inside the process keeps of the last cycles; reading takes none of its time."""
+        if not self._system.is_live:
+            self._blocks.append(self._system.recent(0.6 * RUN_S))
 
     def _collect(self) -> None:
+        if self._watching is None:
+            return
         for block in self._watching.stream(0.25):
             self._blocks.append(block)
             if self._ended.is_set():
@@ -199,11 +210,13 @@ def run(system: supple.System, kind: str, stiffness_n_per_m: float, start_rad: A
     system.request("track", CENTRE_M, trajectory="hold")
     check_fault(system.wait(SETTLE_S))
     late = 0
-    with Recorder(system.prefix) as recorder:
+    with Recorder(system) as recorder:
         if kind == INTERNAL:
             frequency_hz = ANGULAR_FREQUENCY_RAD_PER_S / (2.0 * np.pi)
             begin = system.sinusoid(AMPLITUDE_M, frequency_hz, centre_m=CENTRE_M, ramp_s=RAMP_S).cycle
-            state = system.wait(RUN_S)
+            system.wait(0.5 * RUN_S)
+            recorder.read()
+            state = system.wait(0.5 * RUN_S)
         else:
             with system.set_points(rate_hz) as points:
                 begin = points._begin
@@ -215,6 +228,8 @@ def run(system: supple.System, kind: str, stiffness_n_per_m: float, start_rad: A
                     else:
                         points.send(position, velocity, acceleration)
                     late += points._begin != before
+                    if points._sent == round(0.5 * RUN_S * rate_hz):
+                        recorder.read()
                 state = points.finish()
     check_fault(state)
     return recorder.trace(begin, round(RUN_S / system.period_s), late)
@@ -251,24 +266,22 @@ def spread(comparisons: list[dict[str, float]]) -> dict[str, list[float]]:
     }
 
 
-def stream(options: argparse.Namespace) -> tuple[list[dict[str, Any]], float, list[str]]:
-    """The comparisons, the period, and the faults that ended a run."""
+def in_process(options: argparse.Namespace) -> list[dict[str, Any]]:
+    """The comparisons on a system inside the process; every kind of run once, because a second one gives the same numbers."""
     start_rad = supple.simulated(supple.Arm.load("wam4")).state.q
     traces: dict[tuple[float, str], list[Trace]] = {}
-    faults: list[str] = []
-    kinds = (INTERNAL, POSITIONS, DERIVATIVES)
-    pending = list(itertools.product(range(options.rounds), options.stiffness_n_per_m, kinds))
-    while pending:
-        # A fault leaves the drives idle: the run is repeated on a new system.
-        with repeated(faults), running(options) as system:
-            period_s = system.period_s
-            while pending:
-                round_number, stiffness, kind = pending[0]
-                trace = run(system, kind, stiffness, start_rad, options.rate_hz)
-                traces.setdefault((stiffness, kind), []).append(trace)
-                del pending[0]
-                print(f"  round {round_number + 1}, {stiffness:g} N/m, {kind}: {trace.disturbances()}", file=sys.stderr, flush=True)
-    found = []
+    period_s = 0.0
+    for stiffness, kind in itertools.product(options.stiffness_n_per_m, (INTERNAL, POSITIONS, DERIVATIVES)):
+        system = supple.simulated(supple.Arm.load("wam4"))
+        period_s = system.period_s
+        traces[stiffness, kind] = [run(system, kind, stiffness, start_rad, options.rate_hz)]
+    return comparisons_of(traces, options, period_s)
+
+
+def comparisons_of(
+    traces: dict[tuple[float, str], list[Trace]], options: argparse.Namespace, period_s: float
+) -> list[dict[str, Any]]:
+    found: list[dict[str, Any]] = []
     for stiffness in options.stiffness_n_per_m:
         internal = traces[stiffness, INTERNAL]
         for kind in (POSITIONS, DERIVATIVES, INTERNAL):
@@ -289,7 +302,27 @@ def stream(options: argparse.Namespace) -> tuple[list[dict[str, Any]], float, li
                         "minimum_median_maximum": spread(comparisons),
                     }
                 )
-    return found, period_s, faults
+    return found
+
+
+def stream(options: argparse.Namespace) -> tuple[list[dict[str, Any]], float, list[str]]:
+    """The comparisons, the period, and the faults that ended a run."""
+    start_rad = supple.simulated(supple.Arm.load("wam4")).state.q
+    traces: dict[tuple[float, str], list[Trace]] = {}
+    faults: list[str] = []
+    kinds = (INTERNAL, POSITIONS, DERIVATIVES)
+    pending = list(itertools.product(range(options.rounds), options.stiffness_n_per_m, kinds))
+    while pending:
+        # A fault leaves the drives idle: the run is repeated on a new system.
+        with repeated(faults), running(options) as system:
+            period_s = system.period_s
+            while pending:
+                round_number, stiffness, kind = pending[0]
+                trace = run(system, kind, stiffness, start_rad, options.rate_hz)
+                traces.setdefault((stiffness, kind), []).append(trace)
+                del pending[0]
+                print(f"  round {round_number + 1}, {stiffness:g} N/m, {kind}: {trace.disturbances()}", file=sys.stderr, flush=True)
+    return comparisons_of(traces, options, period_s), period_s, faults
 
 
 def end_of_step_s(rows: supple.States, index: int) -> float:
@@ -374,6 +407,24 @@ def measured_calls(system: supple.System, options: argparse.Namespace) -> tuple[
     return found, {"stamp_age_min_s": min(ages_s), "stamp_age_max_s": max(ages_s)}
 
 
+def print_comparisons(found: list[dict[str, Any]]) -> None:
+    for row in found:
+        numbers = row["minimum_median_maximum"]
+        shown = ", ".join(
+            f"{what} {1e3 * numbers[name][1]:.3f} ({1e3 * numbers[name][0]:.3f} to {1e3 * numbers[name][2]:.3f})"
+            for name, what in (("tip_rms_m", "RMS"), ("tip_max_m", "max"), ("reference_max_m", "max of the reference"))
+        )
+        of_runs = ", ".join(
+            f"{sum(run[name] for run in row['runs'])} {what}"
+            for name, what in (
+                ("missed_cycles", "missed cycles"),
+                ("in_contact", "in contact"),
+                ("late_set_points", "late set-points"),
+            )
+        )
+        print(f"  {row['stiffness_n_per_m']:g} N/m, {row['compared']}: {shown}; {row['pairs']} pairs; in its runs {of_runs}")
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--programs", type=Path, default=ROOT / "target/release", help="folder of the programs")
@@ -398,21 +449,11 @@ def main() -> int:
     if options.only != "latency":
         found, _, faults = stream(options)
         results["stream"] = {"rate_hz": options.rate_hz, "rows": found, "faults": faults}
+        results["in_process"] = in_process(options)
         print(f"Distance of the tip at {options.rate_hz:g} Hz (mm): median of the pairs (minimum to maximum); target {1e3 * TARGET_M:g} mm")
-        for row in found:
-            numbers = row["minimum_median_maximum"]
-            shown = ", ".join(
-                f"{what} {1e3 * numbers[name][1]:.3f} ({1e3 * numbers[name][0]:.3f} to {1e3 * numbers[name][2]:.3f})"
-                for name, what in (("tip_rms_m", "RMS"), ("tip_max_m", "max"), ("reference_max_m", "max of the reference"))
-            )
-            print(
-                f"  {row['stiffness_n_per_m']:g} N/m, {row['compared']}: {shown}; "
-                f"{row['pairs']} pairs; in its runs "
-                + ", ".join(
-                    f"{sum(run[name] for run in row['runs'])} {what}"
-                    for name, what in (("missed_cycles", "missed cycles"), ("in_contact", "in contact"), ("late_set_points", "late set-points"))
-                )
-            )
+        print_comparisons(found)
+        print("The same inside the process")
+        print_comparisons(results["in_process"])
         print(f"  runs repeated because the host delayed a cycle for too long: {len(faults)}")
         loads.append(os.getloadavg()[0])
     if options.only != "stream":
