@@ -61,6 +61,18 @@ impl RegisterReadings {
         self.0[at].map(|bytes| Value::from_bytes(kind, bytes))
     }
 
+    /// Returns the torque of the shaft over the current that the motor's registers state \[N m/A\]: [`Register::TORQUE_CONSTANT`], or
+    /// `3/2 p flux ratio` from the pole pairs, the flux and the gear ratio if that register is zero; `None` if they were not read.
+    pub fn torque_constant_nm_per_a(&self) -> Option<f64> {
+        let stated = self.float(Register::TORQUE_CONSTANT).ok()?;
+        if stated > 0.0 {
+            return Some(stated);
+        }
+        let pole_pairs = f64::from(self.integer(Register::POLE_PAIRS).ok()?);
+        let flux_wb = self.float(Register::FLUX).ok()?;
+        Some(1.5 * pole_pairs * flux_wb * self.float(Register::GEAR_RATIO).ok()?)
+    }
+
     fn integer(&self, register: Register) -> Result<u32, Problem> {
         match self.get(register) {
             Some(Value::Integer(value)) => Ok(value),

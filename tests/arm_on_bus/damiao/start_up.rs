@@ -2,8 +2,11 @@
 //! enables no motor.
 
 use super::rig::Rig;
+use supple_bus::virtual_time::DirectBus;
+use supple_can::drives::damiao::{differing_torque_constants, start_up};
 use supple_core::Vector;
 use supple_drive::Drives;
+use supple_emu::damiao::DamiaoConfig;
 use supple_model::Description;
 
 fn refusal(misbehaviour: &str) -> String {
@@ -118,4 +121,20 @@ fn fd_motors_on_a_bus_of_classic_frames_are_refused_before_a_frame_is_sent() {
         error.contains("classic frames only") && error.contains("fd on"),
         "{error}"
     );
+}
+
+/// Expected: the emulated motors of one model state the same constant; 0.945 N m/A for a 4310 (14 pole pairs, 4.5 mWb, ratio 10),
+/// as its data sheet. A motor with a tenth more flux is named.
+#[test]
+fn motors_whose_torque_constants_differ_are_named() {
+    for (flux_factor, expected) in [(1.0, vec![]), (1.04, vec![]), (1.1, vec![(6, 4)])] {
+        let description = Description::asset("openarm").unwrap();
+        let change = |config: &mut DamiaoConfig| config.motors[6].flux_wb *= flux_factor;
+        let arm = super::rig::arm::<7>(&description, change, None, &[]);
+        let mut bus = DirectBus(arm);
+        let motors = start_up::<7, _>(&mut bus, &description, &|| false).unwrap();
+        assert!((motors[4].torque_constant_nm_per_a - 0.945).abs() < 1e-3);
+        let found = differing_torque_constants(&motors, description.bus().unwrap());
+        assert_eq!(found, expected, "{flux_factor}");
+    }
 }

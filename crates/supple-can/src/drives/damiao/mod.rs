@@ -14,7 +14,7 @@ pub use drive::{Damiao, budget};
 pub use error::DamiaoError;
 pub use motor::Motor;
 pub use program::{DamiaoLoop, stow_config, with_drive};
-pub use start_up::{rates, start_up};
+pub use start_up::{differing_torque_constants, rates, start_up};
 
 use crate::backend::DriveBackend;
 use supple_model::BusKind;

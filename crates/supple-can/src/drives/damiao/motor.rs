@@ -26,6 +26,8 @@ pub struct Motor {
     pub torque_limit_nm: f64,
     /// Temperature limits.
     pub thermal: TemperatureLimits,
+    /// Torque over current that the motor's registers state \[N m/A\].
+    pub torque_constant_nm_per_a: f64,
 }
 
 /// A motor with its state in the cycle.

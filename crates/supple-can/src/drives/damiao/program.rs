@@ -3,7 +3,7 @@
 use super::Motor;
 use super::drive::{Damiao, budget};
 use super::error::DamiaoError;
-use super::start_up::{rates, start_up};
+use super::start_up::{differing_torque_constants, rates, start_up};
 use crate::options::{Options, print_budget};
 use crate::run::{Startup, run_arm};
 use supple_bus::{Bus, BusError};
@@ -127,6 +127,7 @@ impl<const N: usize> Startup<N> for Motors<'_, N> {
     ) -> Result<[Motor; N], DamiaoError> {
         let stop_requested = || stop.shutdown_requested();
         let motors = start_up::<N, _>(bus, self.description, &stop_requested)?;
+        report_torque_constants(&motors, self.description);
         diagnostics::post(format_args!(
             "supple-can: {N} motors ready; the arm has no brakes: support it, or let it lie, until gravity hold"
         ));
@@ -168,6 +169,30 @@ impl<const N: usize> Startup<N> for Motors<'_, N> {
 
     fn into_bus(drive: Self::Drive) -> Box<dyn Bus> {
         drive.into_bus()
+    }
+}
+
+/// Posts the torque constants of the motors, and a warning for each motor that differs from others of its model.
+fn report_torque_constants<const N: usize>(motors: &[Motor; N], description: &Description) {
+    let Some(bus) = description.bus() else {
+        return;
+    };
+    let constants: Vec<String> = motors
+        .iter()
+        .map(|motor| format!("{:.3}", motor.torque_constant_nm_per_a))
+        .collect();
+    diagnostics::post(format_args!(
+        "supple-can: torque constants by the motors' registers: {} N m/A",
+        constants.join(", ")
+    ));
+    for (joint, first) in differing_torque_constants(motors, bus) {
+        let names = [joint, first].map(|index| bus.motors[index].joint.as_str());
+        let [own, other] = [joint, first].map(|index| motors[index].torque_constant_nm_per_a);
+        diagnostics::post(format_args!(
+            "supple-can: warning: by its registers the {} of {} has {own:.3} N m/A, that of {} {other:.3}: check its calibration with \
+             `supple motors`; a weight of known mass shows its true torque",
+            bus.motors[joint].model, names[0], names[1]
+        ));
     }
 }
 

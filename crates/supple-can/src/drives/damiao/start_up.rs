@@ -125,9 +125,31 @@ pub fn start_up<const N: usize, B: Bus>(
             torque_scale: motor.torque_scale,
             torque_limit_nm: limits.joint_torque_nm[joint],
             thermal,
+            torque_constant_nm_per_a: readings.torque_constant_nm_per_a().unwrap_or_default(),
         });
     }
     motors.try_into().map_err(|_| no_motors())
+}
+
+/// Relative difference between the torque constants of two motors of one model that is reported.
+const CONSTANT_TOLERANCE: f64 = 0.05;
+
+/// Returns the motors whose torque constant differs by more than 5 % from that of the first motor of the same model, as pairs of
+/// indices: the motor and that first one.
+pub fn differing_torque_constants<const N: usize>(
+    motors: &[Motor; N],
+    bus: &BusDescription,
+) -> Vec<(usize, usize)> {
+    let first_of = |joint: usize| {
+        let model = &bus.motors[joint].model;
+        bus.motors.iter().position(|motor| motor.model == *model)
+    };
+    let differs = |joint: &usize| {
+        let first = first_of(*joint)?;
+        let [own, other] = [*joint, first].map(|index| motors[index].torque_constant_nm_per_a);
+        ((own - other).abs() > CONSTANT_TOLERANCE * other).then_some((*joint, first))
+    };
+    (0..N).filter_map(|joint| differs(&joint)).collect()
 }
 
 fn expectation<'a>(bus: &BusDescription, motor: &'a BusMotor, fd: bool) -> Expectation<'a> {
