@@ -246,7 +246,13 @@ fn raise_thresholds<const N: usize>(
         let least_nm = least_nm[j].unwrap_or(0.0);
         present_nm.max(least_nm.min(MAX_THRESHOLD_SHARE * limits_nm[j]))
     };
-    let dry = Vector::<N>::from_fn(|j, _| config.friction[j].breakaway_nm / limits_nm[j]);
+    let dry = Vector::<N>::from_fn(|j, _| {
+        let friction = &config.friction[j];
+        // Friction that grows with the load of a gear is greatest at the torque limit.
+        let loaded_nm =
+            friction.load_coefficient * (limits_nm[j] - friction.coulomb_at_nm).max(0.0);
+        (friction.breakaway_nm + loaded_nm) / limits_nm[j]
+    });
     let minimum = MinimumThresholds {
         move_share: 0.0,
         joint_torque_nm: Some((0..N).map(raised_nm).collect()),

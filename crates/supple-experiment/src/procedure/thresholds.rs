@@ -28,6 +28,8 @@ const MAX_LIMIT_FRACTION: f64 = 0.9;
 /// differ from motor to motor.
 const FIRST_FIT_MOVE_SHARE: f64 = 2.0;
 const FIRST_FIT_AGAINST_SHARE: f64 = 0.35;
+/// `limits.joint_tracking_error_rad` before the first fit, as a multiple of the error at which a position loop reaches its torque limit.
+const SATURATED_LOOP_RATIO: f64 = 1.25;
 /// Maximum of `limits.joint_tracking_error_rad` that friction may make necessary \[rad\].
 const MAX_TRACKING_ERROR_RAD: f64 = 0.5;
 /// Number of angles per joint of the grid of poses at which gravity is evaluated.
@@ -75,11 +77,14 @@ pub fn minimum_thresholds<const N: usize>(
         error_nm.min(MAX_LIMIT_FRACTION * limits_nm[joint])
     });
     let shares = threshold_nm.component_div(limits_nm);
+    let saturated_rad = limits_nm.component_div(&config.move_gains.stiffness_nm_per_rad);
+    let tracking_error_rad = SATURATED_LOOP_RATIO * saturated_rad.max();
     Ok(MinimumThresholds {
         joint_torque_nm: Some(threshold_nm.iter().copied().collect()),
         tip_force_n: UNCHECKED_N,
         load_n: UNCHECKED_N,
         against_share: shares.max(),
+        joint_tracking_error_rad: tracking_error_rad.min(MAX_TRACKING_ERROR_RAD),
         ..minimum
     })
 }
