@@ -239,3 +239,56 @@ fn single_steps_run_without_a_calibration() {
     assert_eq!(effects.status.code(), Some(2), "{}", stderr_of(&effects));
     assert!(stderr_of(&effects).contains("effects of a simulated arm"));
 }
+
+/// Expected: with the exact model the arm stays within 1 mm and 2 mrad; with gravity that is 15 % wrong, about 2 N m at the shoulder
+/// against 0.7 N m of friction, the tip drifts by more than 20 mm.
+#[test]
+fn hold_check_measures_drift_and_error_in_poses() {
+    let folder = temporary_folder();
+    let check = |more: &[&str]| {
+        let all = [
+            "hold-check",
+            "--plant",
+            "in-process",
+            "--poses",
+            "3",
+            "--for",
+            "2",
+            "--yes",
+            "--json",
+        ];
+        run(folder.path(), &[&all, more].concat())
+    };
+    let exact = check(&[]);
+    assert!(exact.status.success(), "{}", stderr_of(&exact));
+    let exact = json(&exact);
+    let poses = exact["poses"].as_array().expect("a list");
+    assert_eq!(poses.len(), 3, "{exact}");
+    for pose in poses {
+        assert!(pose["tip_drift_m"].as_f64() < Some(1e-3), "{pose}");
+        let errors = pose["joint_error_rad"].as_array().expect("a list");
+        assert_eq!(errors.len(), 4);
+        for error in errors {
+            assert!(error.as_f64() < Some(2e-3), "{pose}");
+        }
+    }
+    assert!(
+        folder
+            .path()
+            .join("out/hold-check/logs/hold-3.mcap")
+            .exists()
+    );
+    let wrong = check(&["--start-error", "0.15,0.5", "--out", "wrong"]);
+    assert!(wrong.status.success(), "{}", stderr_of(&wrong));
+    let wrong = json(&wrong);
+    let drifts = wrong["poses"].as_array().expect("a list");
+    let drifts = drifts
+        .iter()
+        .filter_map(|pose| pose["tip_drift_m"].as_f64());
+    let worst = drifts.fold(0.0, f64::max);
+    assert!(worst > 0.02, "{wrong}");
+
+    let count = check(&["--stiffness", "1,2"]);
+    assert_eq!(count.status.code(), Some(2), "{}", stderr_of(&count));
+    assert!(stderr_of(&count).contains("--stiffness"));
+}
