@@ -275,7 +275,7 @@ fn hold_check_measures_drift_and_error_in_poses() {
     assert!(
         folder
             .path()
-            .join("out/hold-check/logs/hold-3.mcap")
+            .join("out/hold-check/logs/hold-3-stiffness.mcap")
             .exists()
     );
     let wrong = check(&["--start-error", "0.15,0.5", "--out", "wrong"]);

@@ -146,7 +146,8 @@ fn gravity_hold_is_refused_while_the_arm_is_laid_down() {
     up.wait_until("active drives", |status| status["drives"] == "active");
 }
 
-/// Expected: after the signal the arm is held, with its motors enabled, until `supple stop --supported`; then the system ends.
+/// Expected: after the signal the arm is held, with its motors enabled, until `supple stop --supported`; then the system ends. A
+/// declaration before the shutdown is forgotten.
 #[test]
 fn an_arm_is_held_at_the_end_until_it_is_supported() {
     let mut up = Up::start(&[
@@ -160,6 +161,8 @@ fn an_arm_is_held_at_the_end_until_it_is_supported() {
         "--json",
     ]);
     up.wait_until("active drives", |status| status["drives"] == "active");
+    kill_process(up.child("supple-can"), Signal::USR1).expect("it runs");
+    std::thread::sleep(Duration::from_millis(100));
     kill_process(up.process(), Signal::TERM).expect("it runs");
     std::thread::sleep(Duration::from_secs(4));
     let supported = up.run(&["stop", "--supported"]);

@@ -9,7 +9,9 @@ use supple_drive::{
     Counters, Drive, Drives, LoopError, LossReason, PlantLoop, SharedMemoryLink, Stage,
     TemperatureWarning, TorqueOffBehaviour,
 };
-use supple_realtime::{Stop, diagnostics, monotonic_ns, pause, support_is_declared};
+use supple_realtime::{
+    Stop, diagnostics, forget_support, monotonic_ns, pause, support_is_declared,
+};
 
 /// Timeout of the search for an emulated arm \[ns\].
 const EMULATOR_TIMEOUT_NS: u64 = 5_000_000_000;
@@ -19,6 +21,8 @@ const ARM_LOST_AFTER_NS: u64 = 500_000_000;
 const BRAKE_TIMEOUT_NS: u64 = 250_000_000;
 /// Maximum time for laying the arm down and ending the torque at shutdown if it falls without torque \[ns\].
 const STOW_TIMEOUT_NS: u64 = 60_000_000_000;
+/// Maximum number of motors of an arm.
+const MAX_MOTORS: usize = 8;
 /// Interval between attempts to reach a lost arm, or an emulator that has not started yet.
 pub const SEARCH_INTERVAL: Duration = Duration::from_millis(200);
 
@@ -56,6 +60,7 @@ pub fn run_until_shutdown<const N: usize, D: Drive<N>>(
         stages.report(plant, joint_names);
     }
     plant.begin_shutdown();
+    forget_support();
     let timeout_ns = match plant.drive().torque_off_behaviour() {
         TorqueOffBehaviour::Brakes => BRAKE_TIMEOUT_NS,
         TorqueOffBehaviour::Falls => STOW_TIMEOUT_NS,
@@ -72,7 +77,8 @@ pub fn run_until_shutdown<const N: usize, D: Drive<N>>(
         }
         plant.run()?;
         stages.report(plant, joint_names);
-        if plant.guard().waits_for_support() {
+        // Motors that do not reply hold nothing.
+        if plant.guard().waits_for_support() && plant.drive().motors_replied() {
             until_ns = plant.drive().now_ns() + timeout_ns;
         }
     }
@@ -84,7 +90,7 @@ struct StageReporter {
     loss: Option<(LossReason, u64)>,
     stage: Stage,
     waits_for_support: bool,
-    temperature: TemperatureReport,
+    temperature: [TemperatureReport; MAX_MOTORS],
 }
 
 impl Default for StageReporter {
@@ -93,7 +99,7 @@ impl Default for StageReporter {
             loss: None,
             stage: Stage::Resting,
             waits_for_support: false,
-            temperature: TemperatureReport::default(),
+            temperature: Default::default(),
         }
     }
 }
@@ -107,17 +113,19 @@ impl StageReporter {
     ) {
         let drive = plant.drive();
         let now_ns = drive.now_ns();
-        if let Some(warning) = drive.temperature_warning()
-            && self.temperature.is_new(&warning, now_ns)
-        {
-            let joint = joint_names.get(warning.motor).copied();
-            let joint = joint.unwrap_or(Text::EMPTY);
-            let limit = 100.0 * warning.torque_share;
-            diagnostics::post(format_args!(
-                "supple-can: warning: motor {} ({joint}) is at {} degrees Celsius; it has {limit:.0} % of its torque limit: let it cool",
-                warning.motor + 1,
-                warning.celsius
-            ));
+        for (motor, report) in self.temperature.iter_mut().enumerate() {
+            let Some(warning) = drive.temperature_warning(motor) else {
+                continue;
+            };
+            if report.is_new(&warning, now_ns) {
+                let joint = joint_names.get(motor).copied().unwrap_or(Text::EMPTY);
+                let limit = 100.0 * warning.torque_share;
+                diagnostics::post(format_args!(
+                    "supple-can: warning: motor {} ({joint}) is at {} degrees Celsius; it has {limit:.0} % of its torque limit: let it cool",
+                    motor + 1,
+                    warning.celsius
+                ));
+            }
         }
         let in_words = |reason: &LossReason| reason.with_names(joint_names).to_string();
         let guard = plant.guard();
@@ -170,7 +178,7 @@ impl StageReporter {
     }
 }
 
-/// What has been reported of hot motors.
+/// What has been reported of a hot motor.
 #[derive(Default)]
 struct TemperatureReport {
     /// The last report.
@@ -255,7 +263,6 @@ mod tests {
         let mut report = TemperatureReport::default();
         let mut is_new = |celsius, second| {
             let warning = TemperatureWarning {
-                motor: 1,
                 celsius,
                 torque_share: 1.0,
             };

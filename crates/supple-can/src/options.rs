@@ -31,7 +31,7 @@ pub struct Options {
     #[arg(long, value_name = "M_PER_S", default_value_t = 1.0, value_parser = speed)]
     pub speed_limit_m_per_s: f64,
     /// At the end, holds an arm that falls without torque until SIGUSR1 declares that the arm is supported, instead of laying it down.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "virtual_time")]
     pub hold_until_supported: bool,
     /// Tares the force/torque sensor at start-up.
     #[arg(long)]

@@ -4,7 +4,7 @@ use crate::cycles::{EndReason, SEARCH_INTERVAL, open, run_until_shutdown, sum_co
 use crate::options::Options;
 use supple_bus::{Address, Bus, BusError};
 use supple_core::Config;
-use supple_drive::{Counters, Drive, LoopError, PlantLoop, SharedMemoryLink};
+use supple_drive::{Counters, Drive, LoopError, PlantLoop, SharedMemoryLink, TorqueOffBehaviour};
 use supple_ipc::{Domain, IpcError, PlantLink};
 use supple_process::Program;
 use supple_realtime::{Stop, diagnostics, pause, spin_duration};
@@ -84,6 +84,14 @@ pub fn run_arm<const N: usize, S: Startup<N>>(
             link.set_spin_duration(spin_duration(options.spin_us));
         }
         let mut plant = startup.plant_loop(bus, link, ready, first)?;
+        let falls = plant.drive().torque_off_behaviour() == TorqueOffBehaviour::Falls;
+        match (options.hold_until_supported, falls) {
+            (true, true) => plant.hold_until_supported(),
+            (true, false) => diagnostics::post(format_args!(
+                "supple-can: warning: --hold-until-supported is ignored: the motors of this arm brake without torque"
+            )),
+            (false, _) => {}
+        }
         first = false;
         let names = config.joint_names;
         let ended = run_until_shutdown(&mut plant, options.cycles, stop, names.as_slice())?;

@@ -123,10 +123,21 @@ impl MotorGuard {
     /// that arrived for the one command of the cycle.
     ///
     /// # Errors
-    /// The first fault, in this and in all later cycles. Silence is an exception: it is reported only while it lasts.
+    /// The first fault, in this and in all later cycles. Silence is an exception: it is reported only while it lasts. The status of a hot
+    /// motor that switches its torque off replaces [`MotorFault::Hot`].
     pub fn cycle(&mut self, feedback: Option<&Feedback>, replies: u32) -> Result<(), MotorFault> {
         if let Some(fault) = self.fault {
-            return Err(fault);
+            // A hot motor may switch its torque off later.
+            let status = feedback.map(|feedback| feedback.status);
+            let later = match (fault, status) {
+                (MotorFault::Hot { .. }, Some(Status::Disabled)) => MotorFault::Disabled,
+                (MotorFault::Hot { .. }, Some(status)) if status.is_error() => {
+                    MotorFault::Error(status)
+                }
+                _ => fault,
+            };
+            self.fault = Some(later);
+            return Err(later);
         }
         let found = self.check(feedback, replies);
         self.fault = found

@@ -61,8 +61,6 @@ pub struct DriveState {
 /// Motor that is hotter than its warning limit, but not yet at the limit of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TemperatureWarning {
-    /// Index of the motor.
-    pub motor: usize,
     /// Temperature \[degrees Celsius\].
     pub celsius: u8,
     /// Fraction of the torque limit that the motor still has, 0 to 1.
@@ -143,8 +141,9 @@ pub trait Drive<const N: usize> {
     /// State of the drives.
     fn state(&self) -> DriveState;
 
-    /// Returns the hottest motor if it is above its warning limit.
-    fn temperature_warning(&self) -> Option<TemperatureWarning> {
+    /// Returns the warning of a motor that is above its warning limit, but not at the limit of a fault.
+    fn temperature_warning(&self, motor: usize) -> Option<TemperatureWarning> {
+        let _ = motor;
         None
     }
 

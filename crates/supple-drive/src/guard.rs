@@ -312,10 +312,18 @@ impl SafeActionMachine {
         matches!(self.stage, Stage::Stowing(..))
     }
 
-    /// Whether the arm is held until the operator has declared that it is supported. An arm with a motor without torque cannot be
-    /// held for long, and is laid down.
+    /// Whether the arm is held until the operator has declared that it is supported. An arm with a motor that has no torque or reports a
+    /// fault, as one that is hot, cannot be held for long, and is laid down.
     fn must_wait_for_support(&self, input: &GuardInput) -> bool {
-        self.holds_until_supported && input.shutting_down && !self.motor_without_torque
+        let of_motor =
+            |loss: LossReason| matches!(loss, LossReason::Motor(..) | LossReason::EncoderLost(_));
+        let began_by_motor = self.last_loss.is_some_and(|(loss, _)| of_motor(loss));
+        let motor_fails =
+            began_by_motor || input.drive_loss.is_some_and(of_motor) || self.encoder_lost();
+        self.holds_until_supported
+            && input.shutting_down
+            && !self.motor_without_torque
+            && !motor_fails
     }
 
     fn encoder_lost(&self) -> bool {

@@ -35,7 +35,7 @@ pub use private_folder::{
 pub use processor::run_on_supported_processor;
 pub use spin::spin_duration;
 pub use stop::{Stop, StopError, die_with_parent, ignore_file_size_and_tty_signals};
-pub use supported::{listen_for_support, support_is_declared};
+pub use supported::{forget_support, listen_for_support, support_is_declared};
 
 use std::io::Error;
 

@@ -9,6 +9,11 @@ pub fn support_is_declared() -> bool {
     DECLARED.load(Ordering::Acquire)
 }
 
+/// Forgets an earlier declaration: it is valid only while the program shuts down.
+pub fn forget_support() {
+    DECLARED.store(false, Ordering::Release);
+}
+
 /// Makes SIGUSR1 set the declaration. Before this call the signal ends the process.
 pub fn listen_for_support() {
     let handler = declare as extern "C" fn(libc::c_int);
@@ -35,5 +40,7 @@ mod tests {
             std::thread::yield_now();
         }
         assert!(support_is_declared());
+        forget_support();
+        assert!(!support_is_declared());
     }
 }

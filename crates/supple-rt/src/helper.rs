@@ -18,8 +18,8 @@ use supple_ipc::message::{Drives, OperatorReply, OperatorRequest, Outcome, Text}
 use supple_ipc::{Backpressure, Domain, IpcError, OperatorServer};
 use supple_realtime::{diagnostics, pause};
 
-/// Poll interval of the helper.
-const POLL_INTERVAL: Duration = Duration::from_millis(1);
+/// Poll interval of the helper: half a period at 1 kHz, so that a request waits for a quarter of a period in the mean.
+const POLL_INTERVAL: Duration = Duration::from_micros(500);
 /// Maximum number of messages of one kind per iteration.
 const MAX_PER_ITERATION: usize = 256;
 /// Maximum number of set-points that one iteration checks.

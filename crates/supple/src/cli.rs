@@ -190,7 +190,7 @@ pub struct HoldCheckArgs {
     /// Stiffness of each joint in the second part (N m/rad). Default: that of the arm's joint impedance mode.
     #[arg(long, value_name = "NM_PER_RAD,..", value_delimiter = ',', value_parser = between(0.0, 1e4))]
     pub stiffness: Vec<f64>,
-    /// Folder for logs/hold-N.mcap and summary.json.
+    /// Folder for logs/hold-N-gravity.mcap, logs/hold-N-stiffness.mcap and summary.json.
     #[arg(long, value_name = "DIR", default_value = "out/hold-check")]
     pub out: PathBuf,
     /// Seed of the poses and of the simulated arm.

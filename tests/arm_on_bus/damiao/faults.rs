@@ -123,14 +123,14 @@ fn a_warm_motor_warns_before_its_limit_falls() {
     let hotter = "hot:motor=2,celsius=88,at-s=1.2".to_owned();
     let mut rig = Rig::<7>::new("openarm", &[&spec, &hotter]);
     rig.activate();
-    assert_eq!(rig.plant.drive().temperature_warning(), None);
+    assert_eq!(rig.plant.drive().temperature_warning(1), None);
     rig.run_s(0.5);
-    let warning = rig.plant.drive().temperature_warning().unwrap();
-    assert_eq!(warning.motor, 1);
+    let warning = rig.plant.drive().temperature_warning(1).unwrap();
+    assert_eq!(rig.plant.drive().temperature_warning(2), None);
     assert!((70..=75).contains(&warning.celsius), "{warning:?}");
     assert_eq!(warning.torque_share, 1.0);
     rig.run_s(1.0);
-    let warning = rig.plant.drive().temperature_warning().unwrap();
+    let warning = rig.plant.drive().temperature_warning(1).unwrap();
     assert!((81..=88).contains(&warning.celsius), "{warning:?}");
     assert!((0.5..1.0).contains(&warning.torque_share), "{warning:?}");
     assert_eq!(rig.plant.guard().stage(), Stage::Active);

@@ -76,7 +76,23 @@ impl Sweep {
         Sweep::of(config, from_rad, all).with(end)
     }
 
-    /// Returns the space of straight moves in joint space from one pose to the next.
+    /// Returns the space of straight moves in joint space from one of a few distant poses to the next, and to `end_rad`.
+    pub fn of_moves<const N: usize>(
+        config: &Config<N>,
+        from_rad: &Vector<N>,
+        poses: &[Vector<N>],
+        end_rad: &Vector<N>,
+    ) -> Sweep {
+        let mut last_rad = *from_rad;
+        let mut all = Vec::new();
+        for pose_rad in poses {
+            all.extend(line(last_rad, *pose_rad));
+            last_rad = *pose_rad;
+        }
+        Sweep::of_poses(config, from_rad, &all, end_rad)
+    }
+
+    /// Returns the space of a path of close poses in joint space, with straight moves to its start and from its end.
     pub fn of_poses<const N: usize>(
         config: &Config<N>,
         from_rad: &Vector<N>,

@@ -143,21 +143,22 @@ fn in_words(found: &HoldCheck) -> String {
             )
         },
     );
-    let errors = found.worst_error_rad();
-    let of_joint = |joint: usize| {
-        format!(
-            "{} {:.1} mrad at {:.3} N m/rad",
-            found.joints[joint],
-            1e3 * errors[joint],
-            found.stiffness_nm_per_rad[joint]
-        )
-    };
-    let errors: Vec<String> = (0..found.joints.len()).map(of_joint).collect();
     lines.push(format!(
         "{}: {worst}; {} poses ended by a fault",
         found.arm,
         found.faults()
     ));
-    lines.push(format!("held under stiffness: {}", errors.join(", ")));
+    if let Some(errors) = found.worst_error_rad() {
+        let of_joint = |joint: usize| {
+            format!(
+                "{} {:.1} mrad at {:.3} N m/rad",
+                found.joints[joint],
+                1e3 * errors[joint],
+                found.stiffness_nm_per_rad[joint]
+            )
+        };
+        let errors: Vec<String> = (0..found.joints.len()).map(of_joint).collect();
+        lines.push(format!("held under stiffness: {}", errors.join(", ")));
+    }
     lines.join("\n")
 }

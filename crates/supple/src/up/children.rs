@@ -23,6 +23,10 @@ use supple_realtime::{pause, support_is_declared};
 const FILE_CODE: i32 = 6;
 /// Time to wait for a lock that a forked child may still hold briefly.
 const FORK_LOCK_GRACE: Duration = Duration::from_millis(200);
+/// Interval at which a declaration that the arm is supported is repeated to a program that is ending.
+const DECLARE_INTERVAL: Duration = Duration::from_millis(200);
+/// Time from the request to shut down to the declaration, in which a system begins its shutdown.
+const DECLARE_DELAY: Duration = Duration::from_millis(500);
 /// Poll interval while waiting for a process to exit.
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
@@ -165,13 +169,15 @@ impl ChildProcesses {
             send(&child, Signal::TERM);
         }
         let start = Instant::now();
-        let (mut done, mut supported) = (Ok(()), false);
+        let (mut done, mut declared) = (Ok(()), None::<Instant>);
         let status = loop {
             if let Some(status) = status(&mut child)? {
                 break status;
             }
-            if support_is_declared() && !supported {
-                supported = true;
+            // The program forgets a declaration that is older than its own shutdown.
+            let is_due = declared.is_none_or(|last| last.elapsed() > DECLARE_INTERVAL);
+            if support_is_declared() && is_due {
+                declared = Some(Instant::now());
                 send(&child, Signal::USR1);
             }
             if done.is_ok() {
@@ -316,12 +322,12 @@ pub fn stop_running(domain: &Domain, supported: bool) -> Result<bool, Failure> {
     let Some(process) = running(&path) else {
         return Ok(false);
     };
-    let declared = match supported {
-        true => kill_process(process, Signal::USR1),
-        false => Ok(()),
+    let declare = || {
+        pause(DECLARE_DELAY);
+        kill_process(process, Signal::USR1)
     };
-    declared
-        .and_then(|()| kill_process(process, Signal::TERM))
+    kill_process(process, Signal::TERM)
+        .and_then(|()| if supported { declare() } else { Ok(()) })
         .map(|()| true)
         .map_err(|error| Failure::file("end the process of", &path, error.into()))
 }

@@ -18,7 +18,7 @@ use supple_core::controller::{LearningSwitch, Request};
 use supple_ipc::message::Telemetry;
 use supple_ipc::{Domain, TelemetryReader};
 use supple_model::Description;
-use supple_realtime::Stop;
+use supple_realtime::{Stop, forget_support};
 
 /// Timeout for a process to join the system \[s\].
 const JOIN_TIMEOUT_S: u64 = 20;
@@ -331,13 +331,15 @@ impl<'a, const N: usize> System<'a, N> {
             Ok(())
         };
         let children = &mut self.children;
+        forget_support();
+        if self.plan.holds_until_supported {
+            // The clock owner must know of the shutdown before it misses the controller: it would lay the arm down.
+            let _ = children.signal(self.plan.clock_owner.name, Signal::TERM);
+            print_status("an arm that is held is released by `supple stop --supported`");
+        }
         let controller = children.end(self.plan.controller.name, SHUTDOWN_TIMEOUT, &mut drain);
         let within = self.plan.clock_owner_timeout();
-        let name = self.plan.clock_owner.name;
-        if self.plan.holds_until_supported {
-            print_status("the arm is held until `supple stop --supported`");
-        }
-        let clock_owner = children.end(name, within, &mut drain);
+        let clock_owner = children.end(self.plan.clock_owner.name, within, &mut drain);
         let drained = drain();
         if let Some(pendant) = &self.plan.pendant {
             match pendant.record() {

@@ -241,20 +241,13 @@ impl<const N: usize, B: Bus> Drive<N> for Damiao<N, B> {
         }
     }
 
-    fn temperature_warning(&self) -> Option<TemperatureWarning> {
-        if self.power != Power::Enabled {
-            return None;
-        }
-        let motors = self.motors.iter().enumerate();
-        let warnings = motors.filter_map(|(motor, state)| {
-            let (celsius, torque_share) = state.warning()?;
-            Some(TemperatureWarning {
-                motor,
-                celsius,
-                torque_share,
-            })
-        });
-        warnings.max_by_key(|warning| warning.celsius)
+    fn temperature_warning(&self, motor: usize) -> Option<TemperatureWarning> {
+        let motor = self.motors.get(motor)?;
+        let warning = motor.warning().filter(|_| self.power == Power::Enabled);
+        warning.map(|(celsius, torque_share)| TemperatureWarning {
+            celsius,
+            torque_share,
+        })
     }
 
     fn state(&self) -> DriveState {

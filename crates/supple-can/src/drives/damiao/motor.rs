@@ -81,9 +81,13 @@ impl MotorInCycle {
         self.fault
     }
 
-    /// Temperature \[degrees Celsius\], and the fraction of the torque limit that it allows, if it is above the warning limit.
+    /// Temperature \[degrees Celsius\], and the fraction of the torque limit that it allows, if it is above the
+    /// warning limit and below that of a fault.
     pub(super) fn warning(&self) -> Option<(u8, f64)> {
-        let warns = self.guard.heat() != TemperatureLevel::Normal;
+        let warns = matches!(
+            self.guard.heat(),
+            TemperatureLevel::Warning | TemperatureLevel::Derating
+        );
         warns.then(|| (self.guard.celsius(), self.guard.torque_share()))
     }
 

@@ -101,7 +101,6 @@ fn run_joints<const N: usize>(
         description,
         config: &config,
         cycle_config,
-        until_supported: options.hold_until_supported,
     };
     run_arm(&mut startup, &domain, &config, options, stop).map(Some)
 }
@@ -111,7 +110,6 @@ struct Motors<'a, const N: usize> {
     description: &'a Description,
     config: &'a Config<N>,
     cycle_config: CycleConfig,
-    until_supported: bool,
 }
 
 impl<const N: usize> Startup<N> for Motors<'_, N> {
@@ -160,9 +158,6 @@ impl<const N: usize> Startup<N> for Motors<'_, N> {
         )?;
         if !first {
             plant.drive_mut().latch();
-        }
-        if self.until_supported {
-            plant.hold_until_supported();
         }
         Ok(plant)
     }

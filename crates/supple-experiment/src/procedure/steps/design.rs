@@ -105,14 +105,22 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         config: &Config<N>,
         motions: &Motions<N>,
     ) -> Result<(), A::Error> {
+        let sweep = Sweep::of(config, &self.home_rad, &motions.all());
         if self.progress.finished(StepName::Confirmed).is_some() {
-            return Ok(());
+            // After the first fit the arm moves by another design, which is confirmed if it leaves this space.
+            let moves_by_another = self.progress.finished(StepName::FirstFit).is_some();
+            let confirmed = self.progress.sweep.as_ref();
+            if moves_by_another || confirmed.is_some_and(|confirmed| confirmed.contains(&sweep)) {
+                return Ok(());
+            }
+            self.report("this version designs another motion than the one that was confirmed");
+            return Ok(self.confirm_sweep(&sweep)?);
         }
         let stated_s = self.stated_s(config, motions);
         self.progress.stated_s = stated_s;
         let text = format!("about {:.1} minutes of motion follow", stated_s / 60.0);
         self.report(&text);
-        self.confirm_sweep(&Sweep::of(config, &self.home_rad, &motions.all()))?;
+        self.confirm_sweep(&sweep)?;
         Ok(self.finish(StepName::Confirmed, self.progress.moved_s, None)?)
     }
 

@@ -3,9 +3,10 @@
 use super::{GAINS_S, ModelStage, Run, config};
 use crate::excite::move_to;
 use crate::procedure::arm::{Motion, MotionArm};
+use crate::procedure::error::ProcedureError;
 use crate::procedure::motions::Motions;
 use crate::procedure::sweep::Sweep;
-use crate::procedure::{Operator, ProcedureOptions};
+use crate::procedure::{HOLD_REMEDY, Operator, ProcedureOptions};
 use crate::request_sequence::Step;
 use serde::Serialize;
 use supple_core::config::{JointGains, Role};
@@ -67,12 +68,12 @@ impl HoldCheck {
         drifts.reduce(f64::max)
     }
 
-    /// Greatest error of each joint under stiffness \[rad\].
-    pub fn worst_error_rad(&self) -> Vec<f64> {
+    /// Greatest error of each joint under stiffness \[rad\]; `None` without a pose that was held to the end.
+    pub fn worst_error_rad(&self) -> Option<Vec<f64>> {
         let of_joint = |joint: usize| {
             let errors = self.poses.iter();
             let errors = errors.filter_map(|pose| pose.joint_error_rad.get(joint));
-            errors.copied().fold(0.0, f64::max)
+            errors.copied().reduce(f64::max)
         };
         (0..self.joints.len()).map(of_joint).collect()
     }
@@ -87,10 +88,12 @@ impl HoldCheck {
 }
 
 /// Moves an arm with the model `start` to poses of its excitation. Each is held in gravity hold, then by joint impedance with the
-/// stiffness of `check`. The operator confirms the swept space before. There is one log for each pose, `logs/hold-<number>.mcap`.
+/// stiffness of `check`. The operator confirms the swept space before. There are two logs for each pose, `logs/hold-<number>-gravity.mcap` and
+/// `-stiffness.mcap`.
 ///
 /// # Errors
-/// [`crate::procedure::ProcedureError`] with the remedy, and the errors of the arm. A fault in a pose ends this pose only.
+/// [`ProcedureError`] with the remedy, and the errors of the arm. A fault in a pose ends this pose only; an error if it ended all of
+/// them.
 pub fn check_hold<const N: usize, A: MotionArm<N>>(
     arm: &mut A,
     start: &Description,
@@ -109,13 +112,23 @@ pub fn check_hold<const N: usize, A: MotionArm<N>>(
         "{} poses follow, about {minutes:.0} minutes",
         poses.len()
     ));
-    run.confirm_sweep(&Sweep::of_poses(&model, &from_rad, &poses, &run.home_rad))?;
+    run.confirm_sweep(&Sweep::of_moves(&model, &from_rad, &poses, &run.home_rad))?;
     let mut held = Vec::with_capacity(poses.len());
     for (number, pose_rad) in poses.iter().enumerate() {
         run.report(&format!("pose {} of {}", number + 1, poses.len()));
         held.push(run.held_pose(&model, &format!("hold-{}", number + 1), pose_rad, check)?);
     }
     run.home("home")?;
+    if let Some(fault) = held.iter().find_map(|pose| pose.ended.clone())
+        && held.iter().all(|pose| pose.ended.is_some())
+    {
+        return Err(ProcedureError::Stopped {
+            motion: "hold-check".to_owned(),
+            fault,
+            remedy: HOLD_REMEDY,
+        }
+        .into());
+    }
     Ok(HoldCheck {
         arm: start.name().to_owned(),
         joints: start.joint_names().to_vec(),
@@ -150,29 +163,51 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         let steps = [
             move_to(&self.limits, pose_rad, &from_rad),
             recorded(Request::GravityHold, check.hold_s),
-            move_to(&self.limits, pose_rad, pose_rad),
+        ];
+        let mut held = HeldPose {
+            position_rad: pose_rad.as_slice().to_vec(),
+            tip_drift_m: None,
+            joint_error_rad: Vec::new(),
+            ended: None,
+        };
+        match self.held_motion(&format!("{name}-gravity"), &steps)? {
+            Ok(motion) => held.tip_drift_m = Some(tip_drift_m(model, &motion)),
+            Err(fault) => {
+                held.ended = Some(fault);
+                return Ok(held);
+            }
+        }
+        // The arm may have drifted far.
+        let from_rad = self.arm.position_rad()?;
+        let steps = [
+            move_to(&self.limits, pose_rad, &from_rad),
             Step::wait(gains, GAINS_S),
             recorded(impedance, HANDOVER_S + check.hold_s),
         ];
-        let performed = self.arm.perform(name, &steps)?;
-        self.progress.moved_s += performed.moved_s;
-        let ended = performed.stopped.map(|stopped| stopped.fault);
-        if ended.is_some() {
-            self.arm.recover()?;
+        match self.held_motion(&format!("{name}-stiffness"), &steps)? {
+            Ok(motion) => {
+                let end_rad = mean_rad::<N>(&motion, true, model.period_s);
+                held.joint_error_rad = (end_rad - pose_rad).abs().as_slice().to_vec();
+            }
+            Err(fault) => held.ended = Some(fault),
         }
-        // A fault ends the last motion early.
-        let complete =
-            performed.motions.len() - usize::from(ended.is_some()).min(performed.motions.len());
-        let motions = &performed.motions[..complete];
-        Ok(HeldPose {
-            position_rad: pose_rad.as_slice().to_vec(),
-            tip_drift_m: motions.first().map(|motion| tip_drift_m(model, motion)),
-            joint_error_rad: motions.get(1).map_or_else(Vec::new, |motion| {
-                let end_rad = mean_rad::<N>(motion, true, model.period_s);
-                (end_rad - pose_rad).abs().as_slice().to_vec()
-            }),
-            ended,
-        })
+        Ok(held)
+    }
+
+    /// Performs steps of which the last one is recorded; returns its data, or the fault that ended one of them.
+    fn held_motion(
+        &mut self,
+        name: &str,
+        steps: &[Step<N>],
+    ) -> Result<Result<Motion, String>, A::Error> {
+        let performed = self.arm.perform(name, steps)?;
+        self.progress.moved_s += performed.moved_s;
+        if let Some(stopped) = performed.stopped {
+            self.arm.recover()?;
+            return Ok(Err(stopped.fault));
+        }
+        let motion = performed.motions.into_iter().next();
+        Ok(motion.ok_or_else(|| "no cycle was recorded".to_owned()))
     }
 }
 
