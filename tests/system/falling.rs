@@ -5,6 +5,7 @@ use crate::running::{Up, json, run, stderr_of, temporary_folder};
 use core::time::Duration;
 use rustix::process::{Signal, kill_process};
 use std::path::Path;
+use supple_realtime::pause;
 
 /// Maximum number of cycles for laying the arm down.
 const LAID_DOWN_CYCLES: u64 = 6000;
@@ -162,9 +163,9 @@ fn an_arm_is_held_at_the_end_until_it_is_supported() {
     ]);
     up.wait_until("active drives", |status| status["drives"] == "active");
     kill_process(up.child("supple-can"), Signal::USR1).expect("it runs");
-    std::thread::sleep(Duration::from_millis(100));
+    pause(Duration::from_millis(100));
     kill_process(up.process(), Signal::TERM).expect("it runs");
-    std::thread::sleep(Duration::from_secs(4));
+    pause(Duration::from_secs(4));
     let supported = up.run(&["stop", "--supported"]);
     assert!(supported.status.success(), "{}", stderr_of(&supported));
     let output = up.ended();
