@@ -250,7 +250,7 @@ fn a_shutdown_holds_the_arm_until_it_is_supported() {
 /// Expected: a motor that reaches its fault temperature while the arm is held at shutdown ends the holding: the arm is laid down.
 #[test]
 fn a_hot_motor_ends_the_holding_at_a_shutdown() {
-    let mut rig = Rig::<7>::new("openarm", &["hot:motor=2,celsius=110,at-s=3"]);
+    let mut rig = Rig::<7>::new("openarm", &["hot:motor=2,celsius=97,at-s=3"]);
     rig.plant.hold_until_supported();
     rig.activate();
     rig.plant.begin_shutdown();
@@ -258,7 +258,9 @@ fn a_hot_motor_ends_the_holding_at_a_shutdown() {
     assert!(rig.plant.guard().waits_for_support());
     rig.run_s(20.0);
     assert!(rig.stage_names().contains(&"stowing"));
-    assert!(rig.all(Status::Disabled));
+    assert_eq!(rig.plant.guard().stage(), Stage::Resting);
+    let states: Vec<Status> = rig.arm().motors().iter().map(|m| m.status()).collect();
+    assert!(rig.all(Status::Disabled), "{states:?}");
     assert!(rig.max_speed_rad_per_s < 0.5, "{}", rig.max_speed_rad_per_s);
 }
 
