@@ -15,6 +15,9 @@ use supple_model::{Description, MinimumThresholds};
 const LOAD_N: f64 = 40.0;
 /// Value of `plausible.load_n` and `collision.tip_force_n` that no arm reaches \[N\]: it disables both checks.
 const UNCHECKED_N: f64 = 1e4;
+/// Minimum of `collision.tip_force_n` before the first fit, for an arm with brakes \[N\]: a torque ramp, and gravity that is wrong by some
+/// N m, are observed as forces of up to 70 N where the lever of a joint is short; the thresholds of the joints stay.
+const START_TIP_FORCE_N: f64 = 90.0;
 /// Error of the model, as a fraction of its gravity: with an error of 30 % in a joint's gravity, and motors that give 1/1.5 of
 /// the commanded torque, the true gravity takes 2.0 to 2.1 times the model's torque.
 const GRAVITY_ERROR_SHARE: f64 = 1.1;
@@ -55,7 +58,13 @@ pub fn minimum_thresholds<const N: usize>(
         joint_tracking_error_rad: 0.0,
     };
     match (has_no_brakes, before_first_fit) {
-        (false, _) => return Ok(minimum),
+        (false, false) => return Ok(minimum),
+        (false, true) => {
+            return Ok(MinimumThresholds {
+                tip_force_n: START_TIP_FORCE_N,
+                ..minimum
+            });
+        }
         (true, false) => {
             return Ok(MinimumThresholds {
                 move_share: FIRST_FIT_MOVE_SHARE,
