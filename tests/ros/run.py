@@ -167,8 +167,15 @@ def main():
         wait(lambda: "/joint_trajectory" in listed(), "and the subscription", bridge)
 
         latched = QosProfile(durability=QosDurability.TRANSIENT_LOCAL, history_depth=1)
-        described = subscribe("/robot_description", TYPES, qos=latched)
-        wait(lambda: described, "a later subscription receives the description", bridge)
+        described = []
+
+        def describes():
+            # This client asks for the kept message once, when it subscribes, and loses the answer while its direct link to the
+            # bridge comes up; the subscriptions of rmw_zenoh ask again.
+            described[:] = subscribe("/robot_description", TYPES, qos=latched)
+            return described
+
+        wait(describes, "a later subscription receives the description", bridge)
         assert "<robot" in described[0].data
         joints = subscribe("/joint_states", TYPES)
         frames = subscribe("/tf", TYPES)
