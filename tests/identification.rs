@@ -343,6 +343,10 @@ impl Operator for ConfirmingOperator {
     fn confirms(&mut self, _: &Sweep, _: &Path) -> bool {
         true
     }
+
+    fn attaches_weight(&mut self, _: f64) -> bool {
+        false
+    }
 }
 
 /// Starts a calibration of a simulated arm with wrong wiring; returns the error.

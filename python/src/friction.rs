@@ -8,13 +8,16 @@ use supple_core::friction::{self, LoadTorque};
 
 /// Friction of one joint: viscous and Coulomb, continuous over a band, with Stribeck effect and offset.
 ///
-/// ``D(v) = V v + offset + [S + (S0 - S) exp(-(v / v_s)^2)] p(v / delta)`` with
+/// ``D(v) = [V + A p(v / delta)] v + O + O_s e(v) + [S + (S0 - S) e(v)] p(v / delta)`` with ``e(v) = exp(-(v / v_s)^2)`` and
 /// ``p(x) = 2 x - sign(x) x^2`` inside the band and ``sign(x)`` outside. Immutable.
 ///
 /// Parameters
 /// ----------
 /// viscous_nm_s_per_rad : float
 ///     ``V`` (N m s/rad), zero or more. Default 0.
+/// viscous_asymmetry_nm_s_per_rad : float
+///     ``A`` (N m s/rad), half of the difference between the viscous friction of the positive and the negative direction, at
+///     most ``viscous_nm_s_per_rad`` in magnitude. Default 0.
 /// coulomb_nm : float
 ///     ``S`` (N m), zero or more. Default 0.
 /// breakaway_nm : float, optional
@@ -22,7 +25,10 @@ use supple_core::friction::{self, LoadTorque};
 /// stribeck_rad_per_s : float
 ///     ``v_s`` (rad/s), positive. Default 0.05.
 /// offset_nm : float
-///     Torque that does not depend on the velocity (N m). Default 0.
+///     ``O`` (N m), torque that does not depend on the velocity. Default 0.
+/// stribeck_offset_nm : float
+///     ``O_s`` (N m), torque at rest in addition to ``offset_nm``, which falls with the Stribeck effect; at most
+///     ``breakaway_nm - coulomb_nm`` in magnitude. Default 0.
 /// band_rad_per_s : float
 ///     ``delta`` (rad/s), positive. Default 0.01.
 /// presliding_rad : float
@@ -53,7 +59,7 @@ pub struct Friction {
 }
 
 /// Function that a pickle calls, with its arguments.
-type Pickle<'py> = (Bound<'py, PyAny>, ([f64; 9], &'static str));
+type Pickle<'py> = (Bound<'py, PyAny>, ([f64; 11], &'static str));
 
 #[pymethods]
 impl Friction {
@@ -61,26 +67,31 @@ impl Friction {
     #[pyo3(signature = (
         *,
         viscous_nm_s_per_rad = 0.0,
+        viscous_asymmetry_nm_s_per_rad = 0.0,
         coulomb_nm = 0.0,
         breakaway_nm = None,
         stribeck_rad_per_s = friction::Friction::NONE.stribeck_rad_per_s,
         offset_nm = 0.0,
+        stribeck_offset_nm = 0.0,
         band_rad_per_s = friction::Friction::NONE.band_rad_per_s,
         presliding_rad = 0.0,
         load_coefficient = 0.0,
         load_torque = "joint",
         coulomb_at_nm = 0.0,
-    ), text_signature = "(*, viscous_nm_s_per_rad=0.0, coulomb_nm=0.0, breakaway_nm=None, \
-        stribeck_rad_per_s=0.05, offset_nm=0.0, band_rad_per_s=0.01, \
+    ), text_signature = "(*, viscous_nm_s_per_rad=0.0, viscous_asymmetry_nm_s_per_rad=0.0, \
+        coulomb_nm=0.0, breakaway_nm=None, \
+        stribeck_rad_per_s=0.05, offset_nm=0.0, stribeck_offset_nm=0.0, band_rad_per_s=0.01, \
         presliding_rad=0.0, load_coefficient=0.0, load_torque='joint', \
         coulomb_at_nm=0.0)")]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn new(
         viscous_nm_s_per_rad: f64,
+        viscous_asymmetry_nm_s_per_rad: f64,
         coulomb_nm: f64,
         breakaway_nm: Option<f64>,
         stribeck_rad_per_s: f64,
         offset_nm: f64,
+        stribeck_offset_nm: f64,
         band_rad_per_s: f64,
         presliding_rad: f64,
         load_coefficient: f64,
@@ -98,10 +109,12 @@ impl Friction {
         };
         let inner = friction::Friction {
             viscous_nm_s_per_rad,
+            viscous_asymmetry_nm_s_per_rad,
             coulomb_nm,
             breakaway_nm: breakaway_nm.unwrap_or(coulomb_nm),
             stribeck_rad_per_s,
             offset_nm,
+            stribeck_offset_nm,
             band_rad_per_s,
             presliding_rad,
             load_coefficient,
@@ -118,6 +131,12 @@ impl Friction {
     #[getter]
     fn viscous_nm_s_per_rad(&self) -> f64 {
         self.inner.viscous_nm_s_per_rad
+    }
+
+    /// Half of the difference between the viscous friction of the positive and the negative direction (N m s/rad).
+    #[getter]
+    fn viscous_asymmetry_nm_s_per_rad(&self) -> f64 {
+        self.inner.viscous_asymmetry_nm_s_per_rad
     }
 
     /// Coulomb torque in steady sliding (N m).
@@ -171,6 +190,12 @@ impl Friction {
         self.inner.offset_nm
     }
 
+    /// Torque at rest in addition to ``offset_nm``, which falls with the Stribeck effect (N m).
+    #[getter]
+    fn stribeck_offset_nm(&self) -> f64 {
+        self.inner.stribeck_offset_nm
+    }
+
     /// Half-width of the band in which dry friction is a parabola (rad/s).
     #[getter]
     fn band_rad_per_s(&self) -> f64 {
@@ -194,16 +219,18 @@ impl Friction {
         arrays::array(py, torques, velocity.shape())
     }
 
-    /// Constructor for pickles: viscous, Coulomb, breakaway, Stribeck speed, offset, band, presliding, load
-    /// coefficient, load.
+    /// Constructor for pickles: viscous, its asymmetry, Coulomb, breakaway, Stribeck speed, offset, Stribeck offset, band, presliding,
+    /// load coefficient, load.
     #[staticmethod]
-    fn _of(values: [f64; 9], load_torque: &str) -> PyResult<Self> {
+    fn _of(values: [f64; 11], load_torque: &str) -> PyResult<Self> {
         let [
             viscous,
+            viscous_asymmetry,
             coulomb,
             breakaway,
             stribeck,
             offset,
+            stribeck_offset,
             band,
             presliding,
             load_coefficient,
@@ -211,10 +238,12 @@ impl Friction {
         ] = values;
         Self::new(
             viscous,
+            viscous_asymmetry,
             coulomb,
             Some(breakaway),
             stribeck,
             offset,
+            stribeck_offset,
             band,
             presliding,
             load_coefficient,
@@ -228,10 +257,12 @@ impl Friction {
         let rebuild = py.get_type::<Self>().getattr("_of")?;
         let values = [
             f.viscous_nm_s_per_rad,
+            f.viscous_asymmetry_nm_s_per_rad,
             f.coulomb_nm,
             f.breakaway_nm,
             f.stribeck_rad_per_s,
             f.offset_nm,
+            f.stribeck_offset_nm,
             f.band_rad_per_s,
             f.presliding_rad,
             f.load_coefficient,
@@ -243,14 +274,17 @@ impl Friction {
     fn __repr__(&self) -> String {
         let f = &self.inner;
         format!(
-            "Friction(viscous_nm_s_per_rad={}, coulomb_nm={}, breakaway_nm={}, \
-             stribeck_rad_per_s={}, offset_nm={}, band_rad_per_s={}, presliding_rad={}, \
+            "Friction(viscous_nm_s_per_rad={}, viscous_asymmetry_nm_s_per_rad={}, coulomb_nm={}, \
+             breakaway_nm={}, \
+             stribeck_rad_per_s={}, offset_nm={}, stribeck_offset_nm={}, band_rad_per_s={}, presliding_rad={}, \
              load_coefficient={}, load_torque={:?}, coulomb_at_nm={})",
             f.viscous_nm_s_per_rad,
+            f.viscous_asymmetry_nm_s_per_rad,
             f.coulomb_nm,
             f.breakaway_nm,
             f.stribeck_rad_per_s,
             f.offset_nm,
+            f.stribeck_offset_nm,
             f.band_rad_per_s,
             f.presliding_rad,
             f.load_coefficient,

@@ -119,6 +119,7 @@ fn config<const N: usize>(arm: Arm<N>) -> Config<N> {
             gains: Gains::isotropic(50.0, 10.0),
             inertia,
             friction_velocity: FrictionVelocity::Reference,
+            measured_stribeck: false,
             inertial_feedforward: true,
             nullspace_damping_nm_s_per_rad: 0.5,
         },

@@ -112,6 +112,11 @@ pub enum Failure {
         /// Folder of the model.
         folder: PathBuf,
     },
+    /// A running system cannot be stopped for a weight.
+    #[error(
+        "a running system keeps its torque, and no weight can be attached: end it, and give --plant can instead of running"
+    )]
+    WeightNeedsOwnSystem,
     /// A fault ended one or more runs; all results are written.
     #[error("a fault ended {runs}; the results are in {}, with the fault in the report", out.display())]
     Fault {
@@ -570,7 +575,9 @@ impl Failure {
             Failure::Procedure(error) => procedure_code(error),
             Failure::NeedsSupple { .. } | Failure::VirtualTimeNeedsEmu => 2,
             Failure::Interrupted | Failure::OtherMode { .. } => 130,
-            Failure::DrivesNotActive | Failure::OtherModelNeeded { .. } => 10,
+            Failure::DrivesNotActive
+            | Failure::OtherModelNeeded { .. }
+            | Failure::WeightNeedsOwnSystem => 10,
             Failure::Fault { .. } | Failure::RunFault { .. } | Failure::SystemInFault => 5,
             Failure::Log(error) => log_code(error),
             Failure::File { .. }
@@ -625,7 +632,10 @@ impl Failure {
 fn procedure_code(error: &ProcedureError) -> u8 {
     match error {
         ProcedureError::Experiment(error) => experiment_code(error),
-        ProcedureError::Wiring { .. } | ProcedureError::NotConfirmed { .. } => 4,
+        ProcedureError::Wiring { .. }
+        | ProcedureError::NotConfirmed { .. }
+        | ProcedureError::HeavyWeight { .. }
+        | ProcedureError::NoWeight => 4,
         ProcedureError::Stopped { .. } => 5,
         ProcedureError::Resume { .. }
         | ProcedureError::ReadLog { .. }

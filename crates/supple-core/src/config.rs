@@ -141,6 +141,9 @@ pub enum FrictionVelocity {
     Measured,
 }
 
+/// Time over which the velocity in a measured Stribeck effect is averaged \[s\].
+pub const STRIBECK_AVERAGING_S: f64 = 0.05;
+
 /// Parameters and variants of the law (3.6).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Law {
@@ -150,6 +153,11 @@ pub struct Law {
     pub inertia: ApparentInertia,
     /// Velocity in `D`.
     pub friction_velocity: FrictionVelocity,
+    /// Evaluates the Stribeck effect of `D` at the measured velocity, averaged over [`STRIBECK_AVERAGING_S`], where the rest of `D` is
+    /// at that of the reference. Dry friction that falls with the speed by `k` per velocity is negative damping: at low gains, joints
+    /// with little viscous friction `V` stick and slip. The feed-forward then falls with the speed as well. Because of the average, joints
+    /// with an inertia below `k - V` times the averaging time still stick and slip.
+    pub measured_stribeck: bool,
     /// Adds `M Xo''`, which (3.3) does not contain.
     pub inertial_feedforward: bool,
     /// Damping of null-space motion if more than three joints are active \[N m s/rad\], zero or
@@ -165,6 +173,7 @@ impl Law {
             gains,
             inertia: ApparentInertia::Own,
             friction_velocity: FrictionVelocity::Measured,
+            measured_stribeck: false,
             inertial_feedforward: false,
             nullspace_damping_nm_s_per_rad: 0.0,
         }
@@ -246,6 +255,9 @@ pub struct PlausibilityLimits {
     /// Travel of a joint's reference during which its encoder value may stay unchanged \[rad\],
     /// positive.
     pub stuck_rad: f64,
+    /// Factor of the external torque that dry friction may hold while an encoder is unchanged, for a friction model that may be
+    /// too small, 1 or more.
+    pub stiction_factor: f64,
     /// Fraction of a joint's torque limit: net torque above it that opposes an accelerating joint
     /// is a fault. Positive.
     pub against_share: f64,
@@ -260,6 +272,7 @@ impl PlausibilityLimits {
         PlausibilityLimits {
             lost_replies: u32::MAX / 16,
             stuck_rad: f64::MAX,
+            stiction_factor: 1.0,
             against_share: f64::MAX,
             load_n: f64::MAX,
         }

@@ -37,6 +37,30 @@ const RANGE_TOLERANCE: f64 = 1e-4;
 /// Maximum difference between the position in a feedback and in [`Register::SHAFT_POSITION`] \[rad\].
 const POSITION_TOLERANCE_RAD: f64 = 0.01;
 
+/// Registers that determine the torque constant of a motor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TorqueRegisters {
+    /// [`Register::TORQUE_CONSTANT`], zero if it follows from the others \[N m/A\].
+    pub kt_nm_per_a: f64,
+    /// [`Register::POLE_PAIRS`].
+    pub pole_pairs: u32,
+    /// [`Register::FLUX`] \[Wb\].
+    pub flux_wb: f64,
+    /// [`Register::GEAR_RATIO`].
+    pub gear_ratio: f64,
+}
+
+impl TorqueRegisters {
+    /// Returns the torque of the shaft over the current \[N m/A\]: [`Register::TORQUE_CONSTANT`], or `3/2 p flux ratio` if that
+    /// register is zero.
+    pub fn torque_constant_nm_per_a(&self) -> f64 {
+        match self.kt_nm_per_a > 0.0 {
+            true => self.kt_nm_per_a,
+            false => 1.5 * f64::from(self.pole_pairs) * self.flux_wb * self.gear_ratio,
+        }
+    }
+}
+
 /// Replies to [`TO_READ`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RegisterReadings([Option<[u8; 4]>; TO_READ.len()]);
@@ -61,16 +85,14 @@ impl RegisterReadings {
         self.0[at].map(|bytes| Value::from_bytes(kind, bytes))
     }
 
-    /// Returns the torque of the shaft over the current that the motor's registers state \[N m/A\]: [`Register::TORQUE_CONSTANT`], or
-    /// `3/2 p flux ratio` from the pole pairs, the flux and the gear ratio if that register is zero; `None` if they were not read.
-    pub fn torque_constant_nm_per_a(&self) -> Option<f64> {
-        let stated = self.float(Register::TORQUE_CONSTANT).ok()?;
-        if stated > 0.0 {
-            return Some(stated);
-        }
-        let pole_pairs = f64::from(self.integer(Register::POLE_PAIRS).ok()?);
-        let flux_wb = self.float(Register::FLUX).ok()?;
-        Some(1.5 * pole_pairs * flux_wb * self.float(Register::GEAR_RATIO).ok()?)
+    /// Returns the registers that determine the torque constant; `None` if they were not read.
+    pub fn torque_registers(&self) -> Option<TorqueRegisters> {
+        Some(TorqueRegisters {
+            kt_nm_per_a: self.float(Register::TORQUE_CONSTANT).ok()?,
+            pole_pairs: self.integer(Register::POLE_PAIRS).ok()?,
+            flux_wb: self.float(Register::FLUX).ok()?,
+            gear_ratio: self.float(Register::GEAR_RATIO).ok()?,
+        })
     }
 
     fn integer(&self, register: Register) -> Result<u32, Problem> {

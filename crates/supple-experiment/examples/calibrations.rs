@@ -21,6 +21,10 @@ impl Operator for Quiet {
     fn confirms(&mut self, _: &Sweep, _: &Path) -> bool {
         true
     }
+
+    fn attaches_weight(&mut self, _: f64) -> bool {
+        false
+    }
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

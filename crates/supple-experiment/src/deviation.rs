@@ -76,10 +76,12 @@ impl Deviation {
 fn scale_friction<const N: usize>(friction: &mut [LuGre; N], factor: f64) {
     for friction in friction {
         friction.viscous_nm_s_per_rad *= factor;
+        friction.viscous_asymmetry_nm_s_per_rad *= factor;
         friction.coulomb_nm *= factor;
         friction.breakaway_nm *= factor;
         friction.bristle_stiffness_nm_per_rad *= factor;
         friction.bristle_damping_nm_s_per_rad *= factor;
         friction.offset_nm *= factor;
+        friction.stribeck_offset_nm *= factor;
     }
 }

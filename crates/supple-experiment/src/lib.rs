@@ -67,6 +67,7 @@ pub mod teaching;
 mod trace;
 mod tracking;
 mod tracking_prediction;
+mod weighing_result;
 mod wiring;
 
 pub use adapted::Adapted;
@@ -96,4 +97,5 @@ pub use start::{active_joints, start_pose};
 pub use trace::{JointTorque, Sample, Trace};
 pub use tracking::{IdentifiedModelTracking, track_with_identified_model};
 pub use tracking_prediction::{GOOD_M, TrackingPrediction, predict_tracking_error};
+pub use weighing_result::{JointTorqueScale, WeighingResult};
 pub use wiring::Wiring;

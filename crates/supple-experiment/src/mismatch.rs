@@ -4,7 +4,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use supple_core::nalgebra::Vector3;
-use supple_core::{Arm, ArmError, Body, Config, Friction, Joint, Link};
+use supple_core::{Arm, ArmError, Body, Config, Joint, Link};
 
 /// Relative parameter errors of a model. Masses, centres of mass, viscous and dry friction are multiplied by one plus or minus
 /// the fraction. The signs are random, drawn from `seed`; Coulomb and breakaway friction of a joint have the same sign. All other
@@ -61,10 +61,9 @@ impl Mismatch {
         let friction = exact.friction.map(|friction| {
             let viscous_friction_factor = factor(self.friction);
             let dry_friction_factor = factor(self.friction);
-            Friction {
-                viscous_nm_s_per_rad: friction.viscous_nm_s_per_rad * viscous_friction_factor,
-                ..friction.with_dry_scaled(dry_friction_factor)
-            }
+            friction
+                .with_viscous_scaled(viscous_friction_factor)
+                .with_dry_scaled(dry_friction_factor)
         });
         let changed = Arm::new(&joints, arm.joint_from_tip(), None, arm.gravity())?;
         // `joints` are in joint frames; a fit that starts from this model gives its links in the frames of the description.

@@ -17,7 +17,8 @@ use crate::scenario::{STIFFNESS_N_PER_M, gains};
 use crate::tracking_prediction::GOOD_M;
 use nalgebra::{DMatrix, Vector3};
 use serde::{Deserialize, Serialize};
-use supple_core::dynamics::jacobian;
+use supple_core::config::{Role, STRIBECK_AVERAGING_S};
+use supple_core::dynamics::{crba, jacobian};
 use supple_core::{Config, Vector};
 use supple_ident::estimate::pseudo_inverse;
 use supple_ident::{Motion, feedforward_nm};
@@ -167,7 +168,8 @@ impl<const N: usize> SinusoidRegion<N> {
 
 /// Returns the torque by which a joint that is asked to move along these poses sticks and slips at 5 N/m: the difference of breakaway and
 /// Coulomb torque if, on average, dry friction falls with speed by more than viscous friction and the law's damping hold against,
-/// else zero. The feed-forward of friction follows the reference, so that it damps nothing.
+/// else zero. The feed-forward of friction follows the reference, so that it damps nothing. If its Stribeck effect follows the
+/// measured speed, this is so only for a joint that is faster than the average of the measured speed.
 fn sticking_nm<const N: usize>(config: &Config<N>, poses: &[Vector<N>], joint: usize) -> f64 {
     let friction = &config.friction[joint];
     let excess_nm = friction.breakaway_nm - friction.coulomb_nm;
@@ -192,10 +194,35 @@ fn sticking_nm<const N: usize>(config: &Config<N>, poses: &[Vector<N>], joint: u
         let of_law = column.dot(&law_n_s_per_m.component_mul(&column));
         of_law + friction.viscous_nm_s_per_rad - falls_nm_s_per_rad(speed_rad_per_s)
     };
-    let sum: f64 = poses.windows(2).map(damping_nm_s_per_rad).sum();
-    match sum < 0.0 {
+    let pairs = poses.windows(2);
+    let sum: f64 = pairs.clone().map(damping_nm_s_per_rad).sum();
+    let mean_nm_s_per_rad = sum / pairs.len().max(1) as f64;
+    let held = match config.law.measured_stribeck {
+        true => {
+            let lag_s = STRIBECK_AVERAGING_S + 1.0 / config.estimator_rad_per_s;
+            free_inertia_kg_m2(config, &poses[0], joint) / lag_s
+        }
+        false => 0.0,
+    };
+    match mean_nm_s_per_rad < -held {
         true => excess_nm,
         false => 0.0,
+    }
+}
+
+/// Returns the inertia of a joint while all other active joints are free \[kg m^2\].
+fn free_inertia_kg_m2<const N: usize>(config: &Config<N>, q: &Vector<N>, joint: usize) -> f64 {
+    let active: Vec<usize> = (0..N)
+        .filter(|i| config.roles[*i] == Role::Active)
+        .collect();
+    let whole = crba(&config.arm, q);
+    let of_active = DMatrix::from_fn(active.len(), active.len(), |i, j| {
+        whole[(active[i], active[j])]
+    });
+    let at = active.iter().position(|i| *i == joint);
+    match (of_active.try_inverse(), at) {
+        (Some(inverse), Some(at)) => 1.0 / inverse[(at, at)],
+        _ => whole[(joint, joint)],
     }
 }
 

@@ -102,6 +102,14 @@ impl<const N: usize> Rig<N> {
         &self.plant
     }
 
+    /// Fixes a ball of this mass \[kg\] to the tip.
+    ///
+    /// # Errors
+    /// If the mass is not finite and positive.
+    pub fn add_payload(&mut self, mass_kg: f64) -> Result<(), ExperimentError> {
+        Ok(self.plant.add_payload(mass_kg)?)
+    }
+
     /// Puts the arm at rest in this pose, as a support does.
     ///
     /// # Errors

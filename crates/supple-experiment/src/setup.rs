@@ -123,6 +123,10 @@ impl<const N: usize> Setup<N> {
             };
             *friction = Friction {
                 breakaway_nm,
+                stribeck_offset_nm: match variant.stribeck {
+                    true => friction.stribeck_offset_nm,
+                    false => 0.0,
+                },
                 ..*friction
             };
         }

@@ -32,6 +32,7 @@ pub fn track_with_identified_model<const N: usize>(
         if !stribeck {
             for friction in &mut config.friction {
                 friction.breakaway_nm = friction.coulomb_nm;
+                friction.stribeck_offset_nm = 0.0;
             }
         }
         let (trajectory, duration_s) = identified.paths().sinusoid(1.0);

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! tau_j = sum_k Y_jk p_k + I_rj qdd_j + V_j qd_j + S_j p(qd_j/delta) + o_j + A_j |qd_j|
-//!         + B_j exp(-(qd_j/v_s)^2) p(qd_j/delta) + L_j |g_j| p(qd_j/delta)
+//!         + [B_j p(qd_j/delta) + O_j] exp(-(qd_j/v_s)^2) + L_j |g_j| p(qd_j/delta)
 //!                                                      and for a gear coupling (a, b), on joint a,
 //!         + I_c (qdd_a + qdd_b) + V_c (qd_a + qd_b) + S_c p((qd_a + qd_b)/delta)
 //! ```
@@ -30,7 +30,8 @@ pub struct FrictionColumns {
     pub coulomb: bool,
     /// `o`: Coulomb friction that differs by direction is `S` and `o` together.
     pub offset: bool,
-    /// `A`: viscous friction that differs by direction, `|A| <= V`.
+    /// `A`: viscous friction that differs by direction, `|A| <= V`, and with a Stribeck effect `O`, which makes the breakaway torque
+    /// differ by direction; the column of `A` is `|qd_j|` and differs from the law's within `delta` only.
     pub asymmetry: bool,
     /// `L`: Coulomb friction that grows with this torque.
     pub load: Option<LoadTorque>,
@@ -86,6 +87,8 @@ pub enum Column {
     Asymmetry(usize),
     /// `B` of a joint.
     Stribeck(usize),
+    /// `O` of a joint.
+    StribeckOffset(usize),
     /// `L` of a joint.
     Load(usize),
     /// Rotor inertia of a motor that turns with the sum of two joints.
@@ -109,12 +112,18 @@ pub enum Column {
 }
 
 impl Column {
-    /// Returns whether the column is discontinuous at a reversal of motion.
-    pub fn discontinuous_at_reversal(&self) -> bool {
+    /// Returns whether the column is fitted to slow motion, after the others.
+    pub fn is_of_slow_motion(&self) -> bool {
+        matches!(self, Column::Stribeck(_) | Column::StribeckOffset(_))
+    }
+
+    /// Returns whether the column changes faster at a reversal of motion than the filter of the torques follows.
+    pub fn is_fast_at_reversal(&self) -> bool {
         matches!(
             self,
             Column::Coulomb(_)
                 | Column::Stribeck(_)
+                | Column::StribeckOffset(_)
                 | Column::Load(_)
                 | Column::CoupledCoulomb(..)
                 | Column::MotorCoulomb(_)
@@ -182,6 +191,10 @@ impl Columns {
                 (
                     friction.stribeck_rad_per_s.is_some(),
                     Column::Stribeck(joint),
+                ),
+                (
+                    friction.stribeck_rad_per_s.is_some() && friction.asymmetry,
+                    Column::StribeckOffset(joint),
                 ),
                 (friction.load.is_some(), Column::Load(joint)),
             ];
@@ -271,6 +284,7 @@ impl Columns {
             Column::Offset(j) => format!("offset{j}"),
             Column::Asymmetry(j) => format!("A{j}"),
             Column::Stribeck(j) => format!("B{j}"),
+            Column::StribeckOffset(j) => format!("O{j}"),
             Column::Load(j) => format!("L{j}"),
             Column::CoupledRotor(a, b) => format!("Ir{a}+{b}"),
             Column::CoupledViscous(a, b) => format!("V{a}+{b}"),
@@ -293,6 +307,7 @@ impl Columns {
             match *column {
                 Column::Link { .. }
                 | Column::Offset(_)
+                | Column::StribeckOffset(_)
                 | Column::Tilt(_)
                 | Column::TorqueScale(_) => {}
                 Column::Asymmetry(joint) => {

@@ -20,12 +20,16 @@ use supple_core::friction::LoadTorque;
 use supple_core::learned::LearnedTerms;
 use supple_core::{Arm, Config, Friction, Vector};
 
-/// Travel after a reversal from which friction is in steady sliding \[rad\]; bristle deflection is about 1
-/// mrad.
-pub const STEADY_SLIDING_RAD: f64 = 4e-3;
-
 /// Minimum number of samples of a joint.
 const MIN_ROWS: usize = 20;
+
+/// Smallest eigenvalue of the scaled normal equations of the slow samples from which their torques are determined.
+const LEAST_INFORMATION: f64 = 1e-4;
+
+/// Number of equal intervals of speed that have the same weight in the fit of slow motion.
+const SPEED_BINS: usize = 15;
+/// Greatest weight of one of their samples, so that a few samples do not count for all.
+const MAX_SPEED_WEIGHT: f64 = 10.0;
 
 /// Maximum number of reweighting iterations.
 const MAX_REWEIGHTINGS: usize = 5;
@@ -115,7 +119,7 @@ pub fn fit_rows<const N: usize>(
     let second_stage =
         options.slow_rad_per_s > 0.0 && options.friction.stribeck_rad_per_s.is_some();
     let used: Vec<usize> = (0..columns.len())
-        .filter(|i| !(second_stage && matches!(columns.list()[*i], Column::Stribeck(_))))
+        .filter(|i| !(second_stage && columns.list()[*i].is_of_slow_motion()))
         .collect();
     let stage = FitStage {
         columns: &columns,
@@ -358,38 +362,98 @@ fn equal_noise(blocks: &[ReducedSystem], x: &DVector<f64>) -> Vec<f64> {
     vec![(squares / blocks.len() as f64).sqrt(); blocks.len()]
 }
 
-/// Second stage: fits `B >= 0` of each joint to samples below three Stribeck speeds in steady sliding outside
+/// Second stage: fits `B >= |O|` of each joint to samples below three Stribeck speeds in steady sliding outside
 /// the band. Inside the band the friction law is a parabola through zero, but real friction persists until standstill,
-/// which would bias the estimate. A constant is fitted together with `B` and discarded: it absorbs gravity errors.
+/// which would bias the estimate. A constant is fitted together with them and discarded: it absorbs gravity errors.
 fn fit_stribeck(columns: &Columns, parts: &[Vec<JointRows>], x: &mut DVector<f64>) {
     let reach = 3.0 * columns.friction().stribeck_rad_per_s.unwrap_or(0.0);
     let band = columns.friction().band_rad_per_s;
     for (row, &joint) in columns.identified_joints().iter().enumerate() {
-        let Some(position) = columns.position(Column::Stribeck(joint)) else {
+        let Some(stribeck) = columns.position(Column::Stribeck(joint)) else {
             continue;
         };
-        let mut sums = [0.0; 5];
+        let offset = columns.position(Column::StribeckOffset(joint));
+        let (mut shapes, mut torques_nm, mut speeds) = (Vec::new(), Vec::new(), Vec::new());
         for part in parts {
-            let residual = &part[row].b - &part[row].a * &*x;
-            let shape = part[row].a.column(position);
-            for (i, speed) in part[row].speed.iter().enumerate() {
-                let slow = (band..=reach).contains(speed);
-                if slow && part[row].travel_since_reversal_rad[i] >= STEADY_SLIDING_RAD {
-                    let (s, r) = (shape[i], residual[i]);
-                    for (sum, term) in sums.iter_mut().zip([1.0, s, r, s * s, s * r]) {
-                        *sum += term;
-                    }
-                }
+            let part = &part[row];
+            let residual = &part.b - &part.a * &*x;
+            for i in (0..residual.len()).filter(|i| part.is_slow_sliding(*i, &(band..=reach))) {
+                shapes.push([stribeck, offset.unwrap_or(stribeck)].map(|c| part.a[(i, c)]));
+                torques_nm.push(residual[i]);
+                speeds.push(part.speed[i]);
             }
         }
-        let [n, s, r, ss, sr] = sums;
-        let determinant = n * ss - s * s;
-        x[position] = if determinant > 1e-9 * n * ss {
-            ((n * sr - s * r) / determinant).max(0.0)
-        } else {
-            0.0
+        if shapes.len() < MIN_ROWS {
+            continue;
+        }
+        let weights = speed_weights(&speeds, reach);
+        // The mean of the residuals is a nuisance.
+        let fitted = |columns: &[&dyn Fn(&[f64; 2]) -> f64]| {
+            let a = DMatrix::from_fn(shapes.len(), 1 + columns.len(), |i, c| {
+                weights[i].sqrt() * c.checked_sub(1).map_or(1.0, |c| columns[c](&shapes[i]))
+            });
+            let b = torques_nm.iter().zip(&weights);
+            normal_solution(
+                &a,
+                &b.map(|(nm, weight)| nm * weight.sqrt()).collect::<Vec<_>>(),
+            )
         };
+        // The excess of each direction, B + O and B - O, is not negative.
+        let positive = |of: &[f64; 2]| 0.5 * (of[0] + of[1]);
+        let negative = |of: &[f64; 2]| 0.5 * (of[0] - of[1]);
+        let both = offset.and_then(|_| fitted(&[&positive, &negative]));
+        let alone = |of: &dyn Fn(&[f64; 2]) -> f64| fitted(&[of]).map_or(0.0, |x| x[1].max(0.0));
+        let excess_nm = both.map(|both| match (both[1] < 0.0, both[2] < 0.0) {
+            (false, false) => [both[1], both[2]],
+            (false, true) => [alone(&positive), 0.0],
+            (true, false) => [0.0, alone(&negative)],
+            (true, true) => [0.0; 2],
+        });
+        // One direction alone does not tell them apart.
+        let [positive_nm, negative_nm] =
+            excess_nm.unwrap_or_else(|| [alone(&|of: &[f64; 2]| of[0]); 2]);
+        x[stribeck] = 0.5 * (positive_nm + negative_nm);
+        if let Some(offset) = offset {
+            x[offset] = 0.5 * (positive_nm - negative_nm);
+        }
     }
+}
+
+/// Returns the weight of each slow sample with which all speeds up to `reach_rad_per_s` count the same, as far as the greatest weight
+/// allows: most samples of a smooth motion are near its greatest speed, and what a joint does near rest would not count.
+pub(crate) fn speed_weights(speeds_rad_per_s: &[f64], reach_rad_per_s: f64) -> Vec<f64> {
+    let bin =
+        |speed: &f64| ((speed / reach_rad_per_s * SPEED_BINS as f64) as usize).min(SPEED_BINS - 1);
+    let mut counts = [0_usize; SPEED_BINS];
+    speeds_rad_per_s
+        .iter()
+        .for_each(|speed| counts[bin(speed)] += 1);
+    let filled = counts.iter().filter(|count| **count > 0).count().max(1);
+    let share = speeds_rad_per_s.len() as f64 / filled as f64;
+    let weights = speeds_rad_per_s.iter();
+    weights
+        .map(|speed| (share / counts[bin(speed)] as f64).min(MAX_SPEED_WEIGHT))
+        .collect()
+}
+
+/// Returns the least-squares solution of a few columns; `None` if they do not determine it.
+fn normal_solution(a: &DMatrix<f64>, torques_nm: &[f64]) -> Option<DVector<f64>> {
+    let square = a.tr_mul(a);
+    let scale: DVector<f64> = square.diagonal().map(|d| d.sqrt());
+    if scale.iter().any(|size| *size <= 0.0) {
+        return None;
+    }
+    let scaled = DMatrix::from_fn(square.nrows(), square.ncols(), |i, j| {
+        square[(i, j)] / (scale[i] * scale[j])
+    });
+    let eigenvalues = scaled.symmetric_eigenvalues();
+    if eigenvalues.min() < LEAST_INFORMATION {
+        return None;
+    }
+    let right = a
+        .tr_mul(&DVector::from_column_slice(torques_nm))
+        .component_div(&scale);
+    Some(scaled.cholesky()?.solve(&right).component_div(&scale))
 }
 
 impl<const N: usize> Fit<N> {

@@ -1,9 +1,14 @@
 //! The rows of one identified joint, and their reduction to a triangular factor.
 
 use crate::qr_reduction::{CHUNK, ReducedSystem};
+use core::ops::RangeInclusive;
 use nalgebra::{DMatrix, DVector};
 use std::sync::OnceLock;
 use supple_core::friction::MAX_LOAD_COEFFICIENT;
+
+/// Travel after a reversal from which friction is in steady sliding \[rad\]; bristle deflection is about 1
+/// mrad.
+pub const STEADY_SLIDING_RAD: f64 = 4e-3;
 
 /// Data for predicting friction that grows with the motor's torque. The column of this friction contains the measured torque,
 /// which a prediction must not use.
@@ -28,6 +33,8 @@ pub struct JointRows {
     pub speed: Vec<f64>,
     /// Travel since the last reversal of the joint \[rad\].
     pub travel_since_reversal_rad: Vec<f64>,
+    /// Whether a reversal of the joint is so near that the step of its dry friction reaches the sample through the filter.
+    pub is_near_reversal: Vec<bool>,
     /// Whether the sample is used.
     pub used: Vec<bool>,
     /// Friction that grows with the torque of the motor, if there is a column for it.
@@ -41,6 +48,7 @@ impl JointRows {
     pub fn new(a: DMatrix<f64>, b: DVector<f64>, speed: Vec<f64>) -> JointRows {
         JointRows {
             travel_since_reversal_rad: vec![f64::INFINITY; speed.len()],
+            is_near_reversal: vec![false; speed.len()],
             used: vec![true; speed.len()],
             motor_load: None,
             a,
@@ -76,6 +84,14 @@ impl JointRows {
         torque
     }
 
+    /// Returns whether a sample is of slow, steady sliding, with a speed in this range.
+    pub(crate) fn is_slow_sliding(&self, sample: usize, rad_per_s: &RangeInclusive<f64>) -> bool {
+        self.used[sample]
+            && rad_per_s.contains(&self.speed[sample])
+            && self.travel_since_reversal_rad[sample] >= STEADY_SLIDING_RAD
+            && !self.is_near_reversal[sample]
+    }
+
     /// Returns the predicted minus measured torques of the samples that are used \[N m\].
     pub fn residual(&self, x: &DVector<f64>) -> Vec<f64> {
         let all = self.predicted(x) - &self.b;
@@ -96,6 +112,7 @@ impl JointRows {
             b: self.b.rows_range(range.clone()).into_owned(),
             speed: self.speed[range.clone()].to_vec(),
             travel_since_reversal_rad: self.travel_since_reversal_rad[range.clone()].to_vec(),
+            is_near_reversal: self.is_near_reversal[range.clone()].to_vec(),
             used: self.used[range.clone()].to_vec(),
             motor_load: self.motor_load.as_ref().map(|load| MotorLoad {
                 column: load.column,

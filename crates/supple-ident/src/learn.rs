@@ -139,10 +139,9 @@ pub fn learn<const N: usize>(
     for (index, &joint) in identified_joints.iter().enumerate() {
         let old = friction[joint];
         let scale = |relative_change: f64| (1.0 + relative_change).max(0.0);
-        learned.friction[joint] = Friction {
-            viscous_nm_s_per_rad: old.viscous_nm_s_per_rad * scale(change[2 * index]),
-            ..old.with_dry_scaled(scale(change[2 * index + 1]))
-        };
+        learned.friction[joint] = old
+            .with_viscous_scaled(scale(change[2 * index]))
+            .with_dry_scaled(scale(change[2 * index + 1]));
     }
     let mut counts = [0_u32; N];
     for (joint, a, residual_nm) in &all_rows {
@@ -224,10 +223,10 @@ fn rows<const N: usize>(
             if qd[joint].abs() < learning.slow_rad_per_s {
                 continue;
             }
-            let viscous = friction[joint].viscous_nm_s_per_rad * qd[joint];
+            let viscous = friction[joint].viscous_torque_nm(qd[joint]);
             let known = model[joint]
                 + viscous
-                + friction[joint].offset_nm
+                + friction[joint].offset_at_nm(qd[joint])
                 + dry[index][i]
                 + effects_nm[(i, joint)];
             let mut a = DVector::zeros(unknowns);

@@ -53,7 +53,7 @@ pub fn arm<const N: usize>(
 }
 
 /// Returns the friction of each joint of the arm in the controller's friction law. Effects that this law does not model
-/// (asymmetry, couplings) are left out; load-dependent friction refers to the load `load_nm` of each identified joint. Held
+/// (couplings) are left out; load-dependent friction refers to the load `load_nm` of each identified joint. Held
 /// joints have no friction.
 pub fn friction(columns: &Columns, x: &DVector<f64>, load_nm: &[f64]) -> Vec<Friction> {
     let value = |column: Column| columns.position(column).map_or(0.0, |i| x[i]);
@@ -66,15 +66,20 @@ pub fn friction(columns: &Columns, x: &DVector<f64>, load_nm: &[f64]) -> Vec<Fri
         };
         let coulomb_nm =
             value(Column::Coulomb(j)) + load_coefficient * coulomb_at_nm + motor_coulomb_nm;
+        let viscous_nm_s_per_rad = value(Column::Viscous(j)) + motor_viscous;
         let shape = columns.friction();
         Friction {
-            viscous_nm_s_per_rad: value(Column::Viscous(j)) + motor_viscous,
+            viscous_nm_s_per_rad,
+            // The constraint of the fit holds up to rounding.
+            viscous_asymmetry_nm_s_per_rad: value(Column::Asymmetry(j))
+                .clamp(-viscous_nm_s_per_rad, viscous_nm_s_per_rad),
             coulomb_nm,
             breakaway_nm: coulomb_nm + value(Column::Stribeck(j)),
             stribeck_rad_per_s: shape
                 .stribeck_rad_per_s
                 .unwrap_or(Friction::NONE.stribeck_rad_per_s),
             offset_nm: value(Column::Offset(j)),
+            stribeck_offset_nm: value(Column::StribeckOffset(j)),
             band_rad_per_s: shape.band_rad_per_s,
             presliding_rad: 0.0,
             load_coefficient,

@@ -13,6 +13,9 @@ use supple_core::friction::LoadTorque;
 use supple_core::math::exp;
 use supple_core::{Arm, Friction, Vector};
 
+/// Periods of the filter's cutoff frequency over which a step of the dry friction settles.
+const FILTER_REACH: f64 = 1.5;
+
 /// Returns the regressor of one state, (identified joints, columns). Other joints count as held at rest, independent of `qd` and
 /// `qdd`. The motor torques are assumed to be those that the links of `arm` need.
 pub fn rows<const N: usize>(
@@ -79,6 +82,10 @@ pub(crate) fn rows_under_load<const N: usize>(
                 let s = qd[j] / friction.stribeck_rad_per_s.unwrap_or(f64::INFINITY);
                 put(j, exp(-s * s) * dry.dry_torque_nm(qd[j]));
             }
+            Column::StribeckOffset(j) => {
+                let s = qd[j] / friction.stribeck_rad_per_s.unwrap_or(f64::INFINITY);
+                put(j, exp(-s * s));
+            }
             Column::Load(j) => {
                 let load_nm = load.map_or(0.0, |load| load[j].abs());
                 put(j, load_nm * dry.dry_torque_nm(qd[j]));
@@ -126,6 +133,27 @@ fn travel_since_reversal(motion: &Motion, j: usize) -> Vec<f64> {
     motion.qd.column(j).iter().map(after).collect()
 }
 
+/// Returns for each sample of joint `j` whether a reversal before or after it is within the reach of the filter.
+fn near_reversals(motion: &Motion, j: usize) -> Vec<bool> {
+    let qd = motion.qd.column(j);
+    let mut near = vec![false; qd.len()];
+    let Some(cutoff_hz) = motion.cutoff_hz else {
+        return near;
+    };
+    let reach = (FILTER_REACH * motion.rate_hz / cutoff_hz).ceil() as usize;
+    let mut direction = 0.0_f64;
+    for (i, v) in qd.iter().enumerate() {
+        if v * direction < 0.0 {
+            let end = i.saturating_add(reach).min(near.len());
+            near[i.saturating_sub(reach)..end].fill(true);
+        }
+        if *v != 0.0 {
+            direction = v.signum();
+        }
+    }
+    near
+}
+
 /// Returns all rows of a motion, for each identified joint. Dry friction changes sign within a sample or two, faster than
 /// the filter of the torques can follow, so its columns pass the same filter. Without a rotor column, the arm's
 /// rotor inertia counts as known.
@@ -159,6 +187,7 @@ pub fn joint_rows<const N: usize>(
             let speed = motion.qd.column(j).iter().map(|v| v.abs()).collect();
             let mut rows = JointRows::new(rows, torques, speed);
             rows.travel_since_reversal_rad = travel_since_reversal(motion, j);
+            rows.is_near_reversal = near_reversals(motion, j);
             if !motion.excluded_intervals.is_empty() {
                 rows.used = (0..samples).map(|i| motion.used(i, j)).collect();
             }
@@ -191,7 +220,7 @@ pub fn joint_rows<const N: usize>(
             .list()
             .iter()
             .enumerate()
-            .filter(|(_, c)| c.discontinuous_at_reversal())
+            .filter(|(_, c)| c.is_fast_at_reversal())
         {
             for joint in &mut joints {
                 let smooth = filter.zero_phase(joint.a.column(c).clone_owned().as_slice())?;

@@ -8,7 +8,8 @@
 
 use crate::error::{IdentError, positive};
 use crate::filter::LowPass;
-use crate::fit::{Fit, STEADY_SLIDING_RAD};
+use crate::fit::Fit;
+use crate::joint_rows::STEADY_SLIDING_RAD;
 use crate::motion::Motion;
 use crate::regressor::joint_rows;
 use nalgebra::{DMatrix, DVector};

@@ -2,7 +2,7 @@
 
 use crate::columns::FrictionColumns;
 use crate::error::IdentError;
-use crate::fit::{Fit, STEADY_SLIDING_RAD, fit};
+use crate::fit::{Fit, fit, speed_weights};
 use crate::motion::Motion;
 use crate::presliding::presliding_rad;
 use crate::procedure::{FrictionChoice, Procedure};
@@ -63,15 +63,14 @@ fn slow_error<const N: usize>(found: &Fit<N>, motions: &[Motion]) -> Result<f64,
     for motion in motions {
         for joint in joint_rows(found.nominal(), &found.columns, motion)? {
             let residual = &joint.a * &found.x - &joint.b;
-            let kept: Vec<f64> = (0..residual.len())
-                .filter(|i| {
-                    slow.contains(&joint.speed[*i])
-                        && joint.travel_since_reversal_rad[*i] >= STEADY_SLIDING_RAD
-                })
-                .map(|i| residual[i])
-                .collect();
-            let mean = kept.iter().sum::<f64>() / kept.len().max(1) as f64;
-            total += kept.iter().map(|r| (r - mean).powi(2)).sum::<f64>();
+            let (kept, speeds): (Vec<f64>, Vec<f64>) = (0..residual.len())
+                .filter(|i| joint.is_slow_sliding(*i, &slow))
+                .map(|i| (residual[i], joint.speed[i]))
+                .unzip();
+            let weights = speed_weights(&speeds, SLOW_RAD_PER_S);
+            let weighted = || kept.iter().zip(&weights);
+            let mean = weighted().map(|(r, w)| w * r).sum::<f64>() / kept.len().max(1) as f64;
+            total += weighted().map(|(r, w)| w * (r - mean).powi(2)).sum::<f64>();
         }
     }
     Ok(total)

@@ -99,6 +99,12 @@ impl Domain {
         self.folder.join(format!("learned-{}", self.prefix))
     }
 
+    /// File in which the program on the bus stores what the registers of the arm's motors state, see `MotorConstants` of
+    /// `supple-model`.
+    pub fn motors_file(&self) -> PathBuf {
+        self.folder.join(format!("motors-{}.toml", self.prefix))
+    }
+
     /// Returns the files through which the operator confirms that the arm is in its home pose, after it has lost its position
     /// reference.
     pub fn home_pose_confirmation(&self) -> HomePoseConfirmation {

@@ -36,8 +36,10 @@ pub mod unknowns {
 use unknowns::{ALL, COULOMB, JOINT, MAP_DRY, MAP_TORQUE, MOMENT, OFFSET, PAYLOAD, SCALE, SHARED};
 use unknowns::{TILT, VISCOUS};
 
-/// Standard deviation of the prior relative to the bound, for payload, tilt, friction and torque scale.
+/// Standard deviation of the prior relative to the bound, for payload, tilt and friction.
 const PRIOR_SHARE: f64 = 0.4;
+/// The same ratio for a torque scale, which identification determines better than its bound.
+const SCALE_SHARE: f64 = 0.2;
 /// The same ratio for an offset, which payload and tilt can explain as well.
 const OFFSET_SHARE: f64 = 0.05;
 /// The same ratio for the map's part that depends on the angle alone.
@@ -114,7 +116,7 @@ fn joint_precision(bound: &DVector<f64>, coulomb_nm: f64) -> DMatrix<f64> {
         (VISCOUS, PRIOR_SHARE),
         (COULOMB, PRIOR_SHARE),
         (OFFSET, OFFSET_SHARE),
-        (SCALE, PRIOR_SHARE),
+        (SCALE, SCALE_SHARE),
     ] {
         matrix[(index, index)] = precision(share * bound[index]);
     }

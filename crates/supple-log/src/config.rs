@@ -252,9 +252,12 @@ mod tests {
             1.0 / 3.0,
         ));
         config.law.friction_velocity = FrictionVelocity::Measured;
+        config.law.measured_stribeck = true;
         config.law.inertial_feedforward = false;
         config.latch.fade = false;
         config.friction[2].offset_nm = f64::from_bits(0x3fb9_9999_9999_999b);
+        config.friction[2].breakaway_nm = config.friction[2].coulomb_nm + 0.5;
+        config.friction[2].stribeck_offset_nm = -1.0 / 3.0;
         let line = |harmonic| Harmonic {
             harmonic,
             sine_nm: 1.0 / 3.0,

@@ -39,10 +39,14 @@ pub(crate) struct LinkDef {
 #[serde(remote = "Friction", deny_unknown_fields)]
 pub(crate) struct FrictionDef {
     viscous_nm_s_per_rad: f64,
+    #[serde(default)]
+    viscous_asymmetry_nm_s_per_rad: f64,
     coulomb_nm: f64,
     breakaway_nm: f64,
     stribeck_rad_per_s: f64,
     offset_nm: f64,
+    #[serde(default)]
+    stribeck_offset_nm: f64,
     band_rad_per_s: f64,
     #[serde(default)]
     presliding_rad: f64,
@@ -158,6 +162,9 @@ enum FrictionVelocityDef {
 pub(crate) struct LawDef {
     #[serde(with = "FrictionVelocityDef")]
     friction_velocity: FrictionVelocity,
+    /// Older logs lack this entry.
+    #[serde(default)]
+    measured_stribeck: bool,
     inertial_feedforward: bool,
     nullspace_damping_nm_s_per_rad: f64,
     #[serde(with = "ApparentInertiaDef")]
@@ -310,11 +317,18 @@ impl<const N: usize> CollisionDef<N> {
     }
 }
 
+fn one() -> f64 {
+    1.0
+}
+
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "PlausibilityLimits", deny_unknown_fields)]
 pub(crate) struct PlausibilityDef {
     lost_replies: u32,
     stuck_rad: f64,
+    /// Older logs lack this entry.
+    #[serde(default = "one")]
+    stiction_factor: f64,
     against_share: f64,
     load_n: f64,
 }

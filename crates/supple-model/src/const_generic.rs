@@ -188,6 +188,7 @@ impl Description {
             plausible: PlausibilityLimits {
                 lost_replies: settings.plausible.lost_replies,
                 stuck_rad: settings.plausible.stuck_rad,
+                stiction_factor: settings.plausible.stiction_factor,
                 against_share: settings.plausible.against_share,
                 load_n: settings.plausible.load_n,
             },
@@ -238,6 +239,7 @@ impl Description {
                 FrictionVelocity::Reference => config::FrictionVelocity::Reference,
                 FrictionVelocity::Measured => config::FrictionVelocity::Measured,
             },
+            measured_stribeck: law.measured_stribeck,
             inertial_feedforward: law.inertial_feedforward,
             nullspace_damping_nm_s_per_rad: law.nullspace_damping_nm_s_per_rad,
         }

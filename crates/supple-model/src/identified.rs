@@ -45,6 +45,8 @@ pub struct MinimumThresholds {
     pub hold_pose: bool,
     /// `plausible.load_n`: threshold of an unmodelled load at the tip \[N\].
     pub load_n: f64,
+    /// `plausible.stiction_factor`: factor of the external torque that dry friction may hold.
+    pub stiction_factor: f64,
     /// `plausible.against_share`: torque that may oppose the acceleration of a joint, as a fraction of its torque limit.
     pub against_share: f64,
     /// `limits.joint_tracking_error_rad`: deviation of a joint from its reference \[rad\].
@@ -166,6 +168,13 @@ impl Description {
                 "plausible",
                 "load_n",
                 minimum.load_n.max(settings.plausible.load_n),
+            ),
+            (
+                "plausible",
+                "stiction_factor",
+                minimum
+                    .stiction_factor
+                    .max(settings.plausible.stiction_factor),
             ),
             (
                 "plausible",
@@ -401,10 +410,19 @@ pub(crate) fn put(table: &mut Table, key: &str, new: Value) {
 fn friction(f: &Friction) -> InlineTable {
     let mut table = InlineTable::new();
     table.insert("viscous_nm_s_per_rad", f.viscous_nm_s_per_rad.into());
+    if f.viscous_asymmetry_nm_s_per_rad != 0.0 {
+        table.insert(
+            "viscous_asymmetry_nm_s_per_rad",
+            f.viscous_asymmetry_nm_s_per_rad.into(),
+        );
+    }
     table.insert("coulomb_nm", f.coulomb_nm.into());
     table.insert("breakaway_nm", f.breakaway_nm.into());
     table.insert("stribeck_rad_per_s", f.stribeck_rad_per_s.into());
     table.insert("offset_nm", f.offset_nm.into());
+    if f.stribeck_offset_nm != 0.0 {
+        table.insert("stribeck_offset_nm", f.stribeck_offset_nm.into());
+    }
     table.insert("band_rad_per_s", f.band_rad_per_s.into());
     if f.presliding_rad > 0.0 {
         table.insert("presliding_rad", f.presliding_rad.into());

@@ -207,6 +207,10 @@ pub struct FrictionSettings {
     /// Viscous friction (N m s/rad), zero or more. Default 0.
     #[serde(default)]
     pub viscous_nm_s_per_rad: f64,
+    /// Half of the difference between the viscous friction of the positive and of the negative direction (N m s/rad), at most
+    /// `viscous_nm_s_per_rad` in magnitude. Default 0: it is the same in both.
+    #[serde(default)]
+    pub viscous_asymmetry_nm_s_per_rad: f64,
     /// Coulomb friction in steady sliding (N m), zero or more. Default 0.
     #[serde(default)]
     pub coulomb_nm: f64,
@@ -219,6 +223,10 @@ pub struct FrictionSettings {
     /// Torque that does not depend on the velocity (N m). Default 0.
     #[serde(default)]
     pub offset_nm: f64,
+    /// Torque at rest in addition to `offset_nm`, which falls with the Stribeck effect (N m); at most `breakaway_nm - coulomb_nm` in
+    /// magnitude. Default 0.
+    #[serde(default)]
+    pub stribeck_offset_nm: f64,
     /// Half-width of the band in which friction is a parabola (rad/s), positive. Default 0.01.
     #[serde(default = "default::band_rad_per_s")]
     pub band_rad_per_s: f64,
@@ -351,6 +359,9 @@ pub struct PlausibilitySettings {
     /// Travel of the joint reference during which the encoder may stay constant before it counts as stuck (rad).
     /// Default 0.05.
     pub stuck_rad: f64,
+    /// Factor of the external torque that dry friction may hold while an encoder is constant, for a friction model that may be too
+    /// small, 1 or more. Default 1.
+    pub stiction_factor: f64,
     /// Torque that may oppose the joint's acceleration before the controller faults, as a fraction of the joint's
     /// torque limit. Default 0.05.
     pub against_share: f64,
@@ -443,6 +454,9 @@ pub struct LawSettings {
     pub apparent_inertia_kg: Option<[[f64; 3]; 3]>,
     /// Velocity in the friction feed-forward. Default `reference`.
     pub friction_velocity: FrictionVelocity,
+    /// Evaluates the Stribeck effect at the measured velocity, averaged over 50 ms, instead of at that of the reference: fewer joints with
+    /// little viscous friction stick and slip at low gains. Default false.
+    pub measured_stribeck: bool,
     /// Adds `M Xo''`. Default true.
     pub inertial_feedforward: bool,
     /// Damping of null-space motion if more than three joints are active (N m s/rad), zero or more. Default 2.
@@ -536,6 +550,7 @@ impl Default for PlausibilitySettings {
             source: None,
             lost_replies: 3,
             stuck_rad: 0.05,
+            stiction_factor: 1.0,
             against_share: 0.05,
             load_n: 5.0,
         }
@@ -565,6 +580,7 @@ impl Default for LawSettings {
             damping_n_s_per_m: [1.5; 3],
             apparent_inertia_kg: None,
             friction_velocity: FrictionVelocity::Reference,
+            measured_stribeck: false,
             inertial_feedforward: true,
             nullspace_damping_nm_s_per_rad: 2.0,
         }
@@ -682,10 +698,12 @@ impl From<FrictionSettings> for supple_core::Friction {
     fn from(f: FrictionSettings) -> Self {
         supple_core::Friction {
             viscous_nm_s_per_rad: f.viscous_nm_s_per_rad,
+            viscous_asymmetry_nm_s_per_rad: f.viscous_asymmetry_nm_s_per_rad,
             coulomb_nm: f.coulomb_nm,
             breakaway_nm: f.breakaway_nm.unwrap_or(f.coulomb_nm),
             stribeck_rad_per_s: f.stribeck_rad_per_s,
             offset_nm: f.offset_nm,
+            stribeck_offset_nm: f.stribeck_offset_nm,
             band_rad_per_s: f.band_rad_per_s,
             presliding_rad: f.presliding_rad,
             load_coefficient: f.load_coefficient,

@@ -29,6 +29,9 @@ pub const LOAD_FRACTION: f64 = 0.02;
 pub struct LuGre {
     /// `V` \[N m s/rad\], zero or more.
     pub viscous_nm_s_per_rad: f64,
+    /// Half of the difference between the viscous friction of the positive and the negative direction \[N m s/rad\], at most
+    /// `viscous_nm_s_per_rad` in magnitude.
+    pub viscous_asymmetry_nm_s_per_rad: f64,
     /// `S`, dry torque in fast sliding \[N m\], zero or more.
     pub coulomb_nm: f64,
     /// `S_0`, limit of the dry torque at zero sliding speed \[N m\], at least `coulomb_nm`.
@@ -37,6 +40,8 @@ pub struct LuGre {
     pub stribeck_rad_per_s: f64,
     /// Torque that does not depend on the velocity \[N m\].
     pub offset_nm: f64,
+    /// Torque at rest in addition to `offset_nm`, which falls with the Stribeck effect \[N m\].
+    pub stribeck_offset_nm: f64,
     /// `s0` \[N m/rad\], positive with dry friction, zero without.
     pub bristle_stiffness_nm_per_rad: f64,
     /// `s1` \[N m s/rad\], zero or more.
@@ -49,10 +54,12 @@ impl LuGre {
     /// No friction at all.
     pub const NONE: LuGre = LuGre {
         viscous_nm_s_per_rad: 0.0,
+        viscous_asymmetry_nm_s_per_rad: 0.0,
         coulomb_nm: 0.0,
         breakaway_nm: 0.0,
         stribeck_rad_per_s: 0.05,
         offset_nm: 0.0,
+        stribeck_offset_nm: 0.0,
         bristle_stiffness_nm_per_rad: 0.0,
         bristle_damping_nm_s_per_rad: 0.0,
         load_fraction: 0.0,
@@ -71,10 +78,12 @@ impl LuGre {
         let bristle_stiffness_nm_per_rad = coulomb_nm / BRISTLE_DEFLECTION_RAD;
         LuGre {
             viscous_nm_s_per_rad: friction.viscous_nm_s_per_rad,
+            viscous_asymmetry_nm_s_per_rad: friction.viscous_asymmetry_nm_s_per_rad,
             coulomb_nm,
             breakaway_nm,
             stribeck_rad_per_s: friction.stribeck_rad_per_s,
             offset_nm: friction.offset_nm,
+            stribeck_offset_nm: friction.stribeck_offset_nm,
             bristle_stiffness_nm_per_rad,
             bristle_damping_nm_s_per_rad: bristle_stiffness_nm_per_rad * BRISTLE_TIME_S,
             load_fraction: LOAD_FRACTION,
@@ -94,7 +103,22 @@ impl LuGre {
     pub fn steady_torque_nm(&self, velocity_rad_per_s: f64, load: f64) -> f64 {
         let v = velocity_rad_per_s;
         let sign = if v == 0.0 { 0.0 } else { 1.0_f64.copysign(v) };
-        self.viscous_nm_s_per_rad * v + self.offset_nm + sign * self.sliding_nm(v, load)
+        self.viscous_nm(v) + self.constant_nm(v) + sign * self.sliding_nm(v, load)
+    }
+
+    /// Returns the viscous friction, which may be greater in one direction than in the other.
+    fn viscous_nm(&self, v: f64) -> f64 {
+        let coefficient = match v < 0.0 {
+            true => self.viscous_nm_s_per_rad - self.viscous_asymmetry_nm_s_per_rad,
+            false => self.viscous_nm_s_per_rad + self.viscous_asymmetry_nm_s_per_rad,
+        };
+        coefficient * v
+    }
+
+    /// Returns the torque that does not depend on the direction of motion.
+    fn constant_nm(&self, v: f64) -> f64 {
+        let s = v / self.stribeck_rad_per_s;
+        self.offset_nm + self.stribeck_offset_nm * libm::exp(-s * s)
     }
 
     /// Returns `g(v)`.
@@ -130,7 +154,7 @@ impl LuGre {
         dt_s: f64,
     ) -> f64 {
         let v = velocity_rad_per_s;
-        let smooth = scale.viscous * self.viscous_nm_s_per_rad * v + self.offset_nm;
+        let smooth = scale.viscous * self.viscous_nm(v) + self.constant_nm(v);
         if self.bristle_stiffness_nm_per_rad == 0.0 {
             return smooth;
         }
@@ -159,6 +183,9 @@ impl LuGre {
         let must_not_be_negative = "finite and not negative";
         let (v, s) = (self.viscous_nm_s_per_rad, self.coulomb_nm);
         check("viscous_nm_s_per_rad", v, v >= 0.0, must_not_be_negative)?;
+        let a = self.viscous_asymmetry_nm_s_per_rad;
+        let must = "finite and at most viscous_nm_s_per_rad in magnitude";
+        check("viscous_asymmetry_nm_s_per_rad", a, a.abs() <= v, must)?;
         check("coulomb_nm", s, s >= 0.0, must_not_be_negative)?;
         let s0 = self.breakaway_nm;
         check(
@@ -170,6 +197,12 @@ impl LuGre {
         let vs = self.stribeck_rad_per_s;
         check("stribeck_rad_per_s", vs, vs > 0.0, "finite and positive")?;
         check("offset_nm", self.offset_nm, true, "finite")?;
+        check(
+            "stribeck_offset_nm",
+            self.stribeck_offset_nm,
+            true,
+            "finite",
+        )?;
         let k = self.bristle_stiffness_nm_per_rad;
         let valid = if s0 > 0.0 { k > 0.0 } else { k == 0.0 };
         let must = "positive with dry friction, 0 without";

@@ -109,7 +109,7 @@ class Fit:
     _fit: _native.Fit = field(repr=False)
     columns: Mapping[str, float]
     """Every column by name with its value: ``"Izz2"``, rotor ``"Ir0"``, viscous ``"V0"``, Coulomb
-    ``"S0"``, ``"offset0"``, asymmetry ``"A0"``, Stribeck ``"B0"``, load ``"L0"``; joints are counted from 0. SI units."""
+    ``"S0"``, ``"offset0"``, asymmetry ``"A0"``, Stribeck ``"B0"`` and ``"O0"``, load ``"L0"``; joints are counted from 0. SI units."""
     base_names: tuple[str, ...]
     """Each base parameter as text, (rank,)."""
     base_parameters: Array

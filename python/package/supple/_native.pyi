@@ -617,13 +617,16 @@ class Arm:
 class Friction:
     """Friction of one joint: viscous and Coulomb, continuous over a band, with Stribeck effect and offset.
 
-    ``D(v) = V v + offset + [S + (S0 - S) exp(-(v / v_s)^2)] p(v / delta)`` with
+    ``D(v) = [V + A p(v / delta)] v + O + O_s e(v) + [S + (S0 - S) e(v)] p(v / delta)`` with ``e(v) = exp(-(v / v_s)^2)`` and
     ``p(x) = 2 x - sign(x) x^2`` inside the band and ``sign(x)`` outside. Immutable.
 
     Parameters
     ----------
     viscous_nm_s_per_rad : float
         ``V`` (N m s/rad), zero or more. Default 0.
+    viscous_asymmetry_nm_s_per_rad : float
+        ``A`` (N m s/rad), half of the difference between the viscous friction of the positive and the negative direction, at
+        most ``viscous_nm_s_per_rad`` in magnitude. Default 0.
     coulomb_nm : float
         ``S`` (N m), zero or more. Default 0.
     breakaway_nm : float, optional
@@ -631,7 +634,10 @@ class Friction:
     stribeck_rad_per_s : float
         ``v_s`` (rad/s), positive. Default 0.05.
     offset_nm : float
-        Torque that does not depend on the velocity (N m). Default 0.
+        ``O`` (N m), torque that does not depend on the velocity. Default 0.
+    stribeck_offset_nm : float
+        ``O_s`` (N m), torque at rest in addition to ``offset_nm``, which falls with the Stribeck effect; at most
+        ``breakaway_nm - coulomb_nm`` in magnitude. Default 0.
     band_rad_per_s : float
         ``delta`` (rad/s), positive. Default 0.01.
     presliding_rad : float
@@ -660,10 +666,12 @@ class Friction:
         cls,
         *,
         viscous_nm_s_per_rad: float = 0.0,
+        viscous_asymmetry_nm_s_per_rad: float = 0.0,
         coulomb_nm: float = 0.0,
         breakaway_nm: float | None = None,
         stribeck_rad_per_s: float = 0.05,
         offset_nm: float = 0.0,
+        stribeck_offset_nm: float = 0.0,
         band_rad_per_s: float = 0.01,
         presliding_rad: float = 0.0,
         load_coefficient: float = 0.0,
@@ -673,6 +681,10 @@ class Friction:
     @property
     def viscous_nm_s_per_rad(self) -> float:
         """Viscous friction (N m s/rad)."""
+
+    @property
+    def viscous_asymmetry_nm_s_per_rad(self) -> float:
+        """Half of the difference between the viscous friction of the positive and the negative direction (N m s/rad)."""
 
     @property
     def coulomb_nm(self) -> float:
@@ -689,6 +701,10 @@ class Friction:
     @property
     def offset_nm(self) -> float:
         """Torque that does not depend on the velocity (N m)."""
+
+    @property
+    def stribeck_offset_nm(self) -> float:
+        """Torque at rest in addition to ``offset_nm``, which falls with the Stribeck effect (N m)."""
 
     @property
     def band_rad_per_s(self) -> float:

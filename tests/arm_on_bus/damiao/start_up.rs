@@ -133,7 +133,7 @@ fn motors_whose_torque_constants_differ_are_named() {
         let arm = super::rig::arm::<7>(&description, change, None, &[]);
         let mut bus = DirectBus(arm);
         let motors = start_up::<7, _>(&mut bus, &description, &|| false).unwrap();
-        assert!((motors[4].torque_constant_nm_per_a - 0.945).abs() < 1e-3);
+        assert!((motors[4].torque_registers.torque_constant_nm_per_a() - 0.945).abs() < 1e-3);
         let found = differing_torque_constants(&motors, description.bus().unwrap());
         assert_eq!(found, expected, "{flux_factor}");
     }

@@ -449,6 +449,10 @@ pub struct CalibrateArgs {
     /// Run at constant speeds, for torque ripple, also on an arm that falls without torque; others always do.
     #[arg(long, requires = "on")]
     pub ripple_runs: bool,
+    /// Mass of a weight for the last link (kg). At the end the arm is set down, takes it and moves once more, which gives the ratio of
+    /// true to commanded torque of each joint. A simulated arm takes it by itself; at any other somebody is asked to attach it.
+    #[arg(long, value_name = "KG", requires = "on", value_parser = between(0.05, 20.0))]
+    pub weight_kg: Option<f64>,
     /// Number of candidates of the design of the excitation.
     #[arg(
         long,

@@ -6,7 +6,7 @@ use super::mode::Breakaway;
 use super::pose_task::{DIRECTIONS, PoseCycle};
 use super::state::State;
 use super::{Controller, limiter};
-use crate::config::{Config, JointGains, Role};
+use crate::config::{Config, FrictionVelocity, JointGains, Role};
 use crate::law::impedance::{HeldFriction, LawInput, PositionTarget, Task, Torques, impedance};
 use crate::math::{Vector, Vector3, abs, smooth_step};
 use crate::trajectory::{JointReference, Reference};
@@ -99,6 +99,7 @@ impl<const N: usize> State<N> {
                 let (law, friction) = (&config.law, &self.friction);
                 let law_input = LawInput {
                     dry_direction: self.dry_direction.as_ref(),
+                    stribeck_velocity_rad_per_s: self.stribeck_velocity(config),
                     friction_share: self.latch.friction_share(),
                     nullspace_damping_nm_s_per_rad: *controller.nullspace_damping_nm_s_per_rad(),
                     held_friction: self.held_friction(config),
@@ -111,6 +112,14 @@ impl<const N: usize> State<N> {
             (Activity::Float, ..) => self.float_torques(controller),
             _ => self.safe_torques(controller),
         }
+    }
+
+    /// Returns the velocities in the Stribeck effect, if they are not those of the rest of the friction.
+    pub(super) fn stribeck_velocity(&self, config: &Config<N>) -> Option<&Vector<N>> {
+        let law = &config.law;
+        let measured =
+            law.measured_stribeck && law.friction_velocity == FrictionVelocity::Reference;
+        measured.then_some(&self.stribeck_velocity_rad_per_s)
     }
 
     /// Returns the friction feed-forward that is frozen while contact blocks the arm, and shortly after.

@@ -119,7 +119,8 @@ impl<const N: usize> Encoders<N> {
                 false => limits.joint_torque_nm[joint],
             };
             let dry_nm = self.to_joint.column(encoder).abs().dot(&dry_nm);
-            DRY_FRICTION_RATIO * dry_nm + MODEL_ERROR_SHARE * limit_nm
+            let held_nm = DRY_FRICTION_RATIO * dry_nm + MODEL_ERROR_SHARE * limit_nm;
+            config.plausible.stiction_factor * held_nm
         })
     }
 

@@ -192,6 +192,7 @@ impl<const N: usize> State<N> {
         .min(1.0);
         let law_input = LawInput {
             friction: Some((&self.friction, law.friction_velocity)),
+            stribeck_velocity_rad_per_s: self.stribeck_velocity(config),
             friction_share: self.latch.friction_share(),
             held_friction: self.held_friction(config),
             inertial_feedforward: law.inertial_feedforward,

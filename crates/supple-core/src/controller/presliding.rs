@@ -14,7 +14,7 @@
 use super::Controller;
 use super::activity::Activity;
 use super::state::State;
-use crate::config::FrictionVelocity;
+use crate::config::{FrictionVelocity, STRIBECK_AVERAGING_S};
 use crate::dynamics::Terms;
 use crate::law::impedance::Task;
 use crate::math::{Vector, Vector3, abs, exp, sqrt};
@@ -28,6 +28,15 @@ const REST_S: f64 = 0.5;
 const EXTRAPOLATED_M: f64 = 0.05;
 
 impl<const N: usize> State<N> {
+    /// Updates the velocities at which the Stribeck effect is evaluated: the steps of a coarse encoder in a period are as large as the
+    /// Stribeck speed.
+    #[inline(never)]
+    pub(super) fn update_stribeck_velocity(&mut self, elapsed_s: f64) {
+        let share = 1.0 - exp(-elapsed_s / STRIBECK_AVERAGING_S);
+        let change = self.estimator.velocity_rad_per_s - self.stribeck_velocity_rad_per_s;
+        self.stribeck_velocity_rad_per_s += change * share;
+    }
+
     /// Updates the direction of the dry friction and the joint velocities of the reference for one cycle.
     #[inline(never)]
     pub(super) fn update_dry_direction(

@@ -53,6 +53,8 @@ pub struct State<const N: usize> {
     pub(super) contact_velocity_rad_per_s: Vector<N>,
     /// Friction of the joints under their present load.
     pub(super) friction: [Friction; N],
+    /// Joint velocities at which the Stribeck effect is evaluated if the law measures them \[rad/s\].
+    pub(super) stribeck_velocity_rad_per_s: Vector<N>,
     /// Direction of the dry friction to feed forward; `None`: the direction of the velocity.
     pub(super) dry_direction: Option<Vector<N>>,
     /// Joint velocities of the reference for a tip at its reference, where presliding is known \[rad/s\].
@@ -113,6 +115,7 @@ impl<const N: usize> State<N> {
             latch: Latch::new(&config.latch, config.estimator_rad_per_s),
             contact_velocity_rad_per_s: Vector::zeros(),
             friction: config.friction,
+            stribeck_velocity_rad_per_s: Vector::zeros(),
             dry_direction: None,
             velocity_at_reference_rad_per_s: None,
             measured_direction: MeasuredDirection::unknown(),

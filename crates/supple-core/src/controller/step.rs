@@ -93,6 +93,9 @@ pub fn step<const N: usize>(
         reference = None;
     }
     state.supervise_stop(controller, &tip_velocity, elapsed_s);
+    if config.law.measured_stribeck {
+        state.update_stribeck_velocity(elapsed_s);
+    }
     if controller.has_presliding() {
         let tracking = task.as_ref().zip(reference.as_ref());
         state.update_dry_direction(controller, tracking, pose.is_some(), elapsed_s);

@@ -30,6 +30,8 @@ const SUDDEN_STOP_S: f64 = 0.02;
 /// Minimum speed of an encoder that stops between two cycles, as a fraction of the speed above which a joint is fast. Below
 /// it, friction may stop a light joint as suddenly.
 const SUDDEN_STOP_SPEED_SHARE: f64 = 0.2;
+/// Number of cycles in which friction may stop a light joint: an encoder with coarse steps may show its last motion a cycle late.
+const FRICTION_STOP_CYCLES: f64 = 2.0;
 /// Number of cycles with motion that make a contact plausible. Encoders that stick one after the other still have some.
 const CONTACT_CYCLES: u32 = 5;
 /// Limit of the torque that leaves an encoder unchanged in a contact during which it has changed, over the limit without contact. A
@@ -276,15 +278,17 @@ impl<const N: usize> StuckEncoders<N> {
         self.ramp_speed_rad_per_s
     }
 
-    /// Reports an encoder as stuck if it moved and stops changing from one cycle to the next. `max_rad_per_s` are the speed
-    /// limits of the joints.
+    /// Reports an encoder as stuck if it moved and stops changing from one cycle to the next, faster than friction can stop it.
+    /// `max_rad_per_s` are the speed limits of the joints, `friction_rad_per_s2` is the deceleration by friction at most, `lag_s` the lag of
+    /// the estimated velocity.
     pub fn check_sudden_stop(
         &mut self,
         encoders: &Encoders<N>,
         plausible: &PlausibilityLimits,
         velocity_rad_per_s: &Vector<N>,
         max_rad_per_s: &Vector<N>,
-        elapsed_s: f64,
+        friction_rad_per_s2: impl Fn(usize) -> f64,
+        [lag_s, elapsed_s]: [f64; 2],
     ) -> Result<(), Fault> {
         let limit_rad = FAST_STOP_SHARE * plausible.stuck_rad;
         let last_rad_per_s =
@@ -309,7 +313,12 @@ impl<const N: usize> StuckEncoders<N> {
             let value_rad = self.speed_rad_per_s[encoder] * self.unchanged_s[encoder];
             let fast_rad_per_s = MOVING_SHARE * max_rad_per_s[joint];
             if value_rad > SUDDEN_STOP_TRAVEL_SHARE * limit_rad
-                && let Some(share) = self.stop_limit_share(encoder, fast_rad_per_s, elapsed_s)
+                && let Some(share) = self.stop_limit_share(
+                    encoder,
+                    fast_rad_per_s,
+                    friction_rad_per_s2(encoder) * (FRICTION_STOP_CYCLES * elapsed_s + lag_s),
+                    elapsed_s,
+                )
                 && value_rad > share * limit_rad
             {
                 return Err(Fault::EncoderStuck {
@@ -323,15 +332,23 @@ impl<const N: usize> StuckEncoders<N> {
     }
 
     /// Returns the fraction of the travel limit after which an unchanged encoder counts as stuck:
-    /// [`SUDDEN_STOP_TRAVEL_SHARE`] if it moved at full speed in the cycle before it stopped, one if it was fast, else `None`.
+    /// [`SUDDEN_STOP_TRAVEL_SHARE`] if it moved at full speed in the cycle before it stopped, one if it was fast, else `None`. A
+    /// light joint may lose `friction_rad_per_s` by friction meanwhile.
     #[inline(never)]
-    fn stop_limit_share(&self, encoder: usize, fast_rad_per_s: f64, elapsed_s: f64) -> Option<f64> {
+    fn stop_limit_share(
+        &self,
+        encoder: usize,
+        fast_rad_per_s: f64,
+        friction_rad_per_s: f64,
+        elapsed_s: f64,
+    ) -> Option<f64> {
         let speed_rad_per_s = self.speed_rad_per_s[encoder];
         let travel_rad = speed_rad_per_s * elapsed_s;
         let sudden = self.unchanged_s[encoder] > SUDDEN_STOP_S
             && self.change_rad[encoder] > FULL_SPEED_SHARE * travel_rad
             && travel_rad > SUDDEN_STOP_COUNTS * self.min_change_rad[encoder]
-            && speed_rad_per_s > SUDDEN_STOP_SPEED_SHARE * fast_rad_per_s;
+            && speed_rad_per_s > SUDDEN_STOP_SPEED_SHARE * fast_rad_per_s
+            && speed_rad_per_s > friction_rad_per_s;
         match sudden {
             true => Some(SUDDEN_STOP_TRAVEL_SHARE),
             false => (speed_rad_per_s > fast_rad_per_s).then_some(1.0),

@@ -326,7 +326,11 @@ impl<const N: usize> State<N> {
                 &config.plausible,
                 velocity,
                 &config.limits.joint_speed_rad_per_s,
-                input.elapsed_s,
+                |encoder| {
+                    let inertia = encoders.inertia_at(encoder, &self.terms.mass_matrix);
+                    controller.stiction_limit_nm()[encoder] / inertia
+                },
+                [1.0 / config.estimator_rad_per_s, input.elapsed_s],
             )?;
             let external_nm = self.observer.external_torque_nm();
             if stuck.any_unchanged() {

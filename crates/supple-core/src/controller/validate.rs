@@ -335,6 +335,13 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
     let plausible = &config.plausible;
     check_positive("plausible stuck_rad", plausible.stuck_rad)?;
     check_positive("plausible against_share", plausible.against_share)?;
+    check(
+        plausible.stiction_factor.is_finite() && plausible.stiction_factor >= 1.0,
+        "plausible stiction_factor",
+        None,
+        plausible.stiction_factor,
+        "finite and at least 1",
+    )?;
     check_positive("plausible load_n", plausible.load_n)?;
     check_each_joint(
         "collision move_joint_torque_nm",

@@ -48,6 +48,8 @@ pub struct LawInput<'a, T, const N: usize, const D: usize = 3> {
     pub apparent: Option<ChosenInertia<D>>,
     /// Friction of the joints to feed forward, and the velocity at which it is evaluated.
     pub friction: Option<(&'a [Friction; N], FrictionVelocity)>,
+    /// Joint velocities at which the Stribeck effect of active joints is evaluated \[rad/s\]; `None`: as the rest of the friction.
+    pub stribeck_velocity_rad_per_s: Option<&'a Vector<N>>,
     /// Direction of each joint's dry friction, -1 to 1; `None`: the direction of the velocity.
     pub dry_direction: Option<&'a Vector<N>>,
     /// Share of the dry friction feed-forward to apply, 0 to 1. Joints with presliding have all of it while `held_friction` is given.
@@ -70,6 +72,7 @@ impl<'a, T, const N: usize, const D: usize> LawInput<'a, T, N, D> {
             velocity_rad_per_s,
             apparent: None,
             friction: None,
+            stribeck_velocity_rad_per_s: None,
             dry_direction: None,
             friction_share: 1.0,
             held_friction: None,
@@ -118,20 +121,26 @@ pub struct HeldFriction<'a, const N: usize> {
 }
 
 impl<const N: usize> HeldFriction<'_, N> {
-    /// Returns the feed-forward of `joint` at `velocity_rad_per_s` with dry friction in the `direction` of the measured motion
-    /// \[N m\]. Requires presliding.
+    /// Returns the feed-forward of `joint` at `velocity_rad_per_s` with dry friction in the `direction` of the measured motion; offset
+    /// and magnitude of the dry friction are given as long as nothing is kept \[N m\]. Requires presliding.
     fn in_direction_nm(
         &self,
         friction: &Friction,
         joint: usize,
         velocity_rad_per_s: f64,
+        (offset_nm, dry_nm): (f64, f64),
         direction: f64,
     ) -> f64 {
         let kept_nm = friction.dry_size_nm(self.velocity_rad_per_s[joint]);
-        let dry_nm = friction.dry_size_nm(velocity_rad_per_s);
-        self.viscous_share * friction.viscous_nm_s_per_rad * velocity_rad_per_s
-            + friction.offset_nm
+        self.viscous_share * friction.viscous_torque_nm(velocity_rad_per_s)
+            + self.offset_nm(friction, joint, offset_nm)
             + (dry_nm + self.weight * (kept_nm - dry_nm)) * direction
+    }
+
+    /// Returns the offset of `joint`, which is `offset_nm` as long as nothing is kept.
+    fn offset_nm(&self, friction: &Friction, joint: usize, offset_nm: f64) -> f64 {
+        let kept_nm = friction.offset_at_nm(self.velocity_rad_per_s[joint]);
+        offset_nm + self.weight * (kept_nm - offset_nm)
     }
 
     /// Returns the correction of the feed-forward of `joint` at `velocity_rad_per_s` \[N m\]; `share` is the applied fraction of
@@ -141,12 +150,13 @@ impl<const N: usize> HeldFriction<'_, N> {
         friction: &Friction,
         joint: usize,
         velocity_rad_per_s: f64,
-        dry_nm: f64,
+        (offset_nm, dry_nm): (f64, f64),
         share: f64,
     ) -> f64 {
         let kept = friction.dry_torque_nm(self.velocity_rad_per_s[joint]) - dry_nm;
-        let viscous_nm = friction.viscous_nm_s_per_rad * velocity_rad_per_s;
+        let viscous_nm = friction.viscous_torque_nm(velocity_rad_per_s);
         share * self.weight * kept - (1.0 - self.viscous_share) * viscous_nm
+            + (self.offset_nm(friction, joint, offset_nm) - offset_nm)
     }
 }
 
@@ -257,22 +267,27 @@ pub(super) fn add_law_terms<T: Target<D>, F: TermSink<N, D>, const N: usize, con
                 FrictionVelocity::Measured if is_active(i) => input.velocity_rad_per_s[i],
                 _ => reference[i],
             };
-            let share = input.friction_share;
-            let torque_nm = match input.dry_direction {
-                Some(of) => friction[i].torque_in_direction_nm(velocity, of[i], share),
-                None => friction[i].torque_with_dry_share_nm(velocity, share),
+            let stribeck_velocity = match input.stribeck_velocity_rad_per_s {
+                Some(of) if is_active(i) => of[i],
+                _ => velocity,
             };
-            let Some(held) = &input.held_friction else {
-                return torque_nm;
+            let (friction, share) = (&friction[i], input.friction_share);
+            let size_nm = friction.dry_size_nm(stribeck_velocity);
+            let direction = match input.dry_direction {
+                Some(of) => of[i],
+                None => friction.direction(velocity),
             };
-            match input.dry_direction {
-                Some(of) if friction[i].presliding_rad > 0.0 => {
-                    held.in_direction_nm(&friction[i], i, velocity, of[i])
+            let dry_nm = size_nm * direction;
+            let offset_nm = friction.offset_at_nm(stribeck_velocity);
+            let torque_nm = friction.viscous_torque_nm(velocity) + offset_nm + dry_nm * share;
+            match &input.held_friction {
+                None => torque_nm,
+                Some(held) if input.dry_direction.is_some() && friction.presliding_rad > 0.0 => {
+                    held.in_direction_nm(friction, i, velocity, (offset_nm, size_nm), direction)
                 }
-                of => {
-                    let direction = of.map_or_else(|| friction[i].direction(velocity), |of| of[i]);
-                    let dry_nm = friction[i].dry_size_nm(velocity) * direction;
-                    torque_nm + held.difference_nm(&friction[i], i, velocity, dry_nm, share)
+                Some(held) => {
+                    let present = (offset_nm, dry_nm);
+                    torque_nm + held.difference_nm(friction, i, velocity, present, share)
                 }
             }
         };

@@ -1,7 +1,8 @@
 //! Joint friction, Eq. (3.2) made continuous, with the Stribeck effect and an offset.
 //!
 //! ```text
-//! D(v) = V v + offset + [S + (S_0 - S) exp(-(v / v_s)^2)] p(v / delta)
+//! D(v) = [V + A p(v / delta)] v + O + O_s e(v) + [S + (S_0 - S) e(v)] p(v / delta)
+//! e(v) = exp(-(v / v_s)^2)
 //! p(x) = 2 x - sign(x) x^2  for |x| <= 1,   sign(x) beyond
 //! ```
 //!
@@ -11,6 +12,10 @@
 //! ```text
 //! p' = v (1 - p sign(v)) / d
 //! ```
+//!
+//! `A` makes viscous friction differ by direction: `V + A` in the positive, `V - A` in the negative one. Dry friction that differs
+//! by direction is `S` and the offset `O` together, breakaway torque that does so `S_0` and `O + O_s`
+//! together; `|O_s| <= S_0 - S`, so that friction falls with the speed in both directions.
 //!
 //! Gears add dry friction in proportion to a torque, `L |tau|`: the load torque of the joint, or the torque of the motor. The
 //! motor torque is `tau = g +- S` at a load `g`; friction is then greater if the motor drives the load than if the load drives
@@ -25,6 +30,9 @@ use core::fmt;
 
 /// Maximum `load_coefficient`: with a greater coefficient, a torque at the output of the gear could hardly move it.
 pub const MAX_LOAD_COEFFICIENT: f64 = 0.5;
+
+/// Relative error of torques after scaling.
+const ROUNDING: f64 = 1e-12;
 
 /// The torque in proportion to which a gear adds dry friction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,6 +49,9 @@ pub enum LoadTorque {
 pub struct Friction {
     /// `V` \[N m s/rad\], zero or more.
     pub viscous_nm_s_per_rad: f64,
+    /// `A`, half of the difference between the viscous friction of both directions \[N m s/rad\], positive if that of the positive
+    /// direction is greater; its magnitude is at most `viscous_nm_s_per_rad`.
+    pub viscous_asymmetry_nm_s_per_rad: f64,
     /// `S`, Coulomb torque in steady sliding \[N m\], zero or more.
     pub coulomb_nm: f64,
     /// `S_0`, the torque the Stribeck curve tends to at rest \[N m\], at least `coulomb_nm`; if
@@ -48,8 +59,11 @@ pub struct Friction {
     pub breakaway_nm: f64,
     /// `v_s`, the speed over which the Stribeck effect decays \[rad/s\], positive.
     pub stribeck_rad_per_s: f64,
-    /// Torque that does not depend on the velocity \[N m\].
+    /// `O`, torque that does not depend on the velocity \[N m\].
     pub offset_nm: f64,
+    /// `O_s`, torque at rest in addition to `offset_nm`, which falls with the Stribeck effect \[N m\]: breakaway torque that differs by
+    /// direction in another way than the friction of steady sliding.
+    pub stribeck_offset_nm: f64,
     /// `delta`, half-width of the band of (3.2) in which friction is a parabola \[rad/s\], positive.
     pub band_rad_per_s: f64,
     /// `d`, distance over which dry friction reverses after a reversal of motion \[rad\]; zero: dry friction has the direction of
@@ -91,10 +105,12 @@ impl Friction {
     /// No friction.
     pub const NONE: Friction = Friction {
         viscous_nm_s_per_rad: 0.0,
+        viscous_asymmetry_nm_s_per_rad: 0.0,
         coulomb_nm: 0.0,
         breakaway_nm: 0.0,
         stribeck_rad_per_s: 0.05,
         offset_nm: 0.0,
+        stribeck_offset_nm: 0.0,
         band_rad_per_s: 0.01,
         presliding_rad: 0.0,
         load_coefficient: 0.0,
@@ -132,6 +148,15 @@ impl Friction {
             0.0,
             not_negative,
         )?;
+        let viscous = self.viscous_nm_s_per_rad;
+        // A NaN is not within the bounds.
+        if !(-viscous..=viscous).contains(&self.viscous_asymmetry_nm_s_per_rad) {
+            return Err(FrictionError {
+                entry: "viscous_asymmetry_nm_s_per_rad",
+                value: self.viscous_asymmetry_nm_s_per_rad,
+                must: "finite and at most viscous_nm_s_per_rad in magnitude",
+            });
+        }
         at_least("coulomb_nm", self.coulomb_nm, 0.0, not_negative)?;
         at_least(
             "breakaway_nm",
@@ -146,6 +171,16 @@ impl Friction {
             "finite and positive",
         )?;
         at_least("offset_nm", self.offset_nm, f64::MIN, "finite")?;
+        // One direction may have no excess: the bound then holds up to rounding.
+        let excess_nm = self.breakaway_nm - self.coulomb_nm + ROUNDING * self.breakaway_nm;
+        // A NaN is not within the bounds.
+        if !(-excess_nm..=excess_nm).contains(&self.stribeck_offset_nm) {
+            return Err(FrictionError {
+                entry: "stribeck_offset_nm",
+                value: self.stribeck_offset_nm,
+                must: "finite and at most breakaway_nm less coulomb_nm in magnitude",
+            });
+        }
         at_least("presliding_rad", self.presliding_rad, 0.0, not_negative)?;
         if !(0.0..=MAX_LOAD_COEFFICIENT).contains(&self.load_coefficient) {
             return Err(FrictionError {
@@ -170,7 +205,8 @@ impl Friction {
     }
 
     /// Returns the sliding friction while the joint carries `load_nm` \[N m\]: the dry part is the mean of both directions, and
-    /// half of their difference is added to the offset. The Stribeck effect is in proportion to the dry part.
+    /// half of their difference is added to the offset, as for the viscous part to its asymmetry. The Stribeck effect is in
+    /// proportion to the dry part, except for its offset.
     #[inline]
     pub fn at_load(&self, load_nm: f64) -> Friction {
         let (share, size_nm) = (self.load_coefficient, abs(load_nm));
@@ -195,7 +231,10 @@ impl Friction {
         } else {
             1.0
         };
+        let (viscous, asymmetry) = self.viscous_at_load(load_nm, unloaded_nm);
         Friction {
+            viscous_nm_s_per_rad: viscous,
+            viscous_asymmetry_nm_s_per_rad: asymmetry,
             coulomb_nm,
             breakaway_nm: self.breakaway_nm * ratio,
             offset_nm: self.offset_nm + offset_nm,
@@ -203,14 +242,50 @@ impl Friction {
         }
     }
 
+    /// Returns `V` and `A` while the joint carries `load_nm`. The motor also overcomes the viscous friction, which adds dry friction
+    /// by `L V |v|` if the motor drives the load, and relieves the motor by as much if the load drives it: `V / (1 - L)` and
+    /// `V / (1 + L)`. A load near the dry friction `unloaded_nm` is between the two, so that the torque is continuous.
+    #[inline]
+    fn viscous_at_load(&self, load_nm: f64, unloaded_nm: f64) -> (f64, f64) {
+        let (viscous, asymmetry) = (
+            self.viscous_nm_s_per_rad,
+            self.viscous_asymmetry_nm_s_per_rad,
+        );
+        let share = self.load_coefficient;
+        if self.load_torque == LoadTorque::Joint || share == 0.0 {
+            return (viscous, asymmetry);
+        }
+        let (driving, driven) = (1.0 / (1.0 - share), 1.0 / (1.0 + share));
+        let beyond = (abs(load_nm) - unloaded_nm) / unloaded_nm.max(f64::MIN_POSITIVE);
+        let by_load = driving + beyond.clamp(0.0, 1.0) * (driven - driving);
+        let (positive, negative) = match load_nm < 0.0 {
+            true => (by_load, driving),
+            false => (driving, by_load),
+        };
+        let positive = (viscous + asymmetry) * positive;
+        let negative = (viscous - asymmetry) * negative;
+        (0.5 * (positive + negative), 0.5 * (positive - negative))
+    }
+
     /// Returns `factor` times this friction, at `factor` times the load.
     pub fn scaled(&self, factor: f64) -> Friction {
         Friction {
             viscous_nm_s_per_rad: self.viscous_nm_s_per_rad * factor,
+            viscous_asymmetry_nm_s_per_rad: self.viscous_asymmetry_nm_s_per_rad * factor,
             coulomb_nm: self.coulomb_nm * factor,
             breakaway_nm: self.breakaway_nm * factor,
             offset_nm: self.offset_nm * factor,
+            stribeck_offset_nm: self.stribeck_offset_nm * factor,
             coulomb_at_nm: self.coulomb_at_nm * factor,
+            ..*self
+        }
+    }
+
+    /// Returns this friction with `factor` times its viscous friction; `factor` is zero or more.
+    pub fn with_viscous_scaled(&self, factor: f64) -> Friction {
+        Friction {
+            viscous_nm_s_per_rad: self.viscous_nm_s_per_rad * factor,
+            viscous_asymmetry_nm_s_per_rad: self.viscous_asymmetry_nm_s_per_rad * factor,
             ..*self
         }
     }
@@ -220,6 +295,7 @@ impl Friction {
         Friction {
             coulomb_nm: self.coulomb_nm * factor,
             breakaway_nm: self.breakaway_nm * factor,
+            stribeck_offset_nm: self.stribeck_offset_nm * factor,
             load_coefficient: (self.load_coefficient * factor).min(MAX_LOAD_COEFFICIENT),
             ..*self
         }
@@ -242,9 +318,30 @@ impl Friction {
     /// Returns `D(v)` with a fraction `share` of its dry part, 0 to 1 \[N m\].
     #[inline]
     pub fn torque_with_dry_share_nm(&self, velocity_rad_per_s: f64, share: f64) -> f64 {
-        self.viscous_nm_s_per_rad * velocity_rad_per_s
-            + self.offset_nm
+        self.viscous_torque_nm(velocity_rad_per_s)
+            + self.offset_at_nm(velocity_rad_per_s)
             + self.dry_torque_nm(velocity_rad_per_s) * share
+    }
+
+    /// Returns `O + O_s e(v)` \[N m\].
+    #[inline]
+    pub fn offset_at_nm(&self, velocity_rad_per_s: f64) -> f64 {
+        if self.stribeck_offset_nm == 0.0 {
+            return self.offset_nm;
+        }
+        let s = velocity_rad_per_s / self.stribeck_rad_per_s;
+        self.offset_nm + self.stribeck_offset_nm * exp(-s * s)
+    }
+
+    /// Returns the viscous part of `D(v)`, `[V + A p(v / delta)] v` \[N m\].
+    #[inline]
+    pub fn viscous_torque_nm(&self, velocity_rad_per_s: f64) -> f64 {
+        let viscous = self.viscous_nm_s_per_rad;
+        let asymmetry = self.viscous_asymmetry_nm_s_per_rad;
+        if asymmetry == 0.0 {
+            return viscous * velocity_rad_per_s;
+        }
+        (viscous + asymmetry * self.direction(velocity_rad_per_s)) * velocity_rad_per_s
     }
 
     /// Returns `p(v / delta)`: the sign of the velocity, continuous in the band; -1 to 1.
@@ -281,8 +378,8 @@ impl Friction {
         direction: f64,
         share: f64,
     ) -> f64 {
-        self.viscous_nm_s_per_rad * velocity_rad_per_s
-            + self.offset_nm
+        self.viscous_torque_nm(velocity_rad_per_s)
+            + self.offset_at_nm(velocity_rad_per_s)
             + self.dry_size_nm(velocity_rad_per_s) * direction * share
     }
 

@@ -24,16 +24,24 @@ fn any_friction() -> impl Strategy<Value = Friction> {
         0.005..0.5,
         -1.0..1.0,
         0.001..0.1,
+        // Up to three quarters of `V`, friction grows with speed in the band also without Coulomb friction.
+        -0.7..0.7,
+        -1.0..1.0,
     )
-        .prop_map(|(viscous, coulomb, dip, stribeck, offset, band)| Friction {
-            viscous_nm_s_per_rad: viscous,
-            coulomb_nm: coulomb,
-            breakaway_nm: coulomb + dip,
-            stribeck_rad_per_s: stribeck,
-            offset_nm: offset,
-            band_rad_per_s: band,
-            ..Friction::NONE
-        })
+        .prop_map(
+            |(viscous, coulomb, dip, stribeck, offset, band, asymmetry, at_rest)| Friction {
+                viscous_nm_s_per_rad: viscous,
+                viscous_asymmetry_nm_s_per_rad: viscous * asymmetry,
+                coulomb_nm: coulomb,
+                breakaway_nm: coulomb + dip,
+                stribeck_rad_per_s: stribeck,
+                offset_nm: offset,
+                // A sum rounds.
+                stribeck_offset_nm: 0.999 * dip * at_rest,
+                band_rad_per_s: band,
+                ..Friction::NONE
+            },
+        )
 }
 
 /// One-sided difference quotient: towards larger speeds if `h > 0`.
@@ -127,8 +135,10 @@ proptest! {
     #![proptest_config(config(256, 20_260_103))]
 
     #[test]
-    fn is_odd_about_its_offset(friction in any_friction(), v in -3.0..3.0) {
-        let centred = |v| friction.torque_nm(v) - friction.offset_nm;
+    fn is_odd_about_its_offset_and_asymmetry(friction in any_friction(), v in -3.0..3.0) {
+        let asymmetry = friction.viscous_asymmetry_nm_s_per_rad;
+        let asymmetric = |v| asymmetry * v * friction.direction(v);
+        let centred = |v| friction.torque_nm(v) - friction.offset_at_nm(v) - asymmetric(v);
         prop_assert!((centred(v) + centred(-v)).abs() <= 1e-14);
         let inside = v * friction.band_rad_per_s / 3.0;
         prop_assert!((centred(inside) + centred(-inside)).abs() <= 1e-14);
@@ -137,7 +147,7 @@ proptest! {
     #[test]
     fn friction_is_dissipative(friction in any_friction(), v in -3.0..3.0) {
         for v in [v, v * friction.band_rad_per_s, 0.0] {
-            let dissipated_w = v * (friction.torque_nm(v) - friction.offset_nm);
+            let dissipated_w = v * (friction.torque_nm(v) - friction.offset_at_nm(v));
             prop_assert!(dissipated_w >= -1e-15, "{dissipated_w} W at {v} rad/s");
         }
     }
@@ -148,7 +158,7 @@ proptest! {
         slow in -3.0..3.0,
         more in 0.0..1.0,
     ) {
-        let friction = Friction { breakaway_nm: friction.coulomb_nm, ..friction };
+        let friction = Friction { breakaway_nm: friction.coulomb_nm, stribeck_offset_nm: 0.0, ..friction };
         for (slow, more) in [(slow, more), (slow * friction.band_rad_per_s, more * 1e-3)] {
             let gain = friction.torque_nm(slow + more) - friction.torque_nm(slow);
             prop_assert!(gain >= -1e-14, "{gain} N m");
@@ -165,7 +175,8 @@ proptest! {
             let h = 1e-6 * band.min(friction.stribeck_rad_per_s);
             let left = one_sided_slope(&friction, v, -h);
             let right = one_sided_slope(&friction, v, h);
-            let steepest = 2.0 * friction.breakaway_nm / band + friction.breakaway_nm / friction.stribeck_rad_per_s;
+            let steepest = 2.0 * friction.breakaway_nm / band
+                + (friction.breakaway_nm + friction.stribeck_offset_nm.abs()) / friction.stribeck_rad_per_s;
             let allowed = 1e-5 * (1.0 + steepest) + 4e-15 / h;
             prop_assert!((left - right).abs() <= allowed, "{left} and {right} at {v} rad/s");
         }
@@ -182,11 +193,16 @@ fn invalid_friction_is_rejected() {
     type Entry = (&'static str, fn(&mut Friction, f64), &'static [f64]);
     const NAN: f64 = f64::NAN;
     const INF: f64 = f64::INFINITY;
-    let entries: [Entry; 9] = [
+    let entries: [Entry; 11] = [
         (
             "viscous_nm_s_per_rad",
             |f, x| f.viscous_nm_s_per_rad = x,
             &[-0.1, NAN, INF],
+        ),
+        (
+            "viscous_asymmetry_nm_s_per_rad",
+            |f, x| f.viscous_asymmetry_nm_s_per_rad = x,
+            &[1.983, -1.983, NAN, INF],
         ),
         ("coulomb_nm", |f, x| f.coulomb_nm = x, &[-0.1, NAN, INF]),
         (
@@ -200,6 +216,11 @@ fn invalid_friction_is_rejected() {
             &[0.0, -0.1, NAN, INF],
         ),
         ("offset_nm", |f, x| f.offset_nm = x, &[NAN, INF, -INF]),
+        (
+            "stribeck_offset_nm",
+            |f, x| f.stribeck_offset_nm = x,
+            &[0.61, -0.61, NAN, INF, -INF],
+        ),
         (
             "band_rad_per_s",
             |f, x| f.band_rad_per_s = x,
@@ -270,7 +291,7 @@ fn dry_friction_grows_with_the_torque_of_the_motor() {
         let loaded = WITH_LOAD.at_load(load_nm);
         assert_eq!(loaded.validate(), Ok(()));
         for v in [-1.0, -0.03, 0.02, 0.7] {
-            let dry_nm = loaded.torque_nm(v) - loaded.viscous_nm_s_per_rad * v;
+            let dry_nm = loaded.torque_nm(v) - loaded.viscous_torque_nm(v);
             let motor_nm = load_nm + dry_nm;
             let expected_nm = (unloaded_nm + 0.1 * motor_nm.abs()) * f64::signum(v);
             close(dry_nm, expected_nm, 1e-12);
@@ -285,6 +306,36 @@ fn dry_friction_grows_with_the_torque_of_the_motor() {
         let loaded = of_joint.at_load(load_nm);
         close(loaded.coulomb_nm, unloaded_nm + 0.1 * load_nm.abs(), 1e-12);
         close(loaded.offset_nm, 0.0, 1e-12);
+    }
+}
+
+/// The motor's torque also overcomes the viscous friction, in both directions of a load that is greater than all friction.
+#[test]
+fn viscous_friction_is_part_of_the_torque_of_the_motor() {
+    let law = Friction {
+        viscous_asymmetry_nm_s_per_rad: 0.3,
+        ..WITH_LOAD
+    };
+    let unloaded_nm = law.coulomb_nm - 0.1 * 4.0;
+    for load_nm in [-9.0, 7.0] {
+        let loaded = law.at_load(load_nm);
+        assert_eq!(loaded.validate(), Ok(()));
+        for v in [-1.0, -0.03, 0.02, 0.7] {
+            let friction_nm = loaded.torque_nm(v);
+            let size_nm = (1.9823 + 0.3 * v.signum()) * v.abs() + unloaded_nm;
+            let expected_nm = size_nm + 0.1 * (load_nm + friction_nm).abs();
+            close(friction_nm, expected_nm * v.signum(), 1e-12);
+        }
+    }
+    // The torque is continuous over the load.
+    for v in [-0.5, 0.3] {
+        let torque_nm = |load_nm: f64| law.at_load(load_nm).torque_nm(v);
+        for k in -300..300 {
+            let load_nm = 0.02 * f64::from(k);
+            let step_nm = torque_nm(load_nm + 0.02) - torque_nm(load_nm);
+            // Friction grows by less than half of the step of the load.
+            assert!(step_nm.abs() < 0.01, "{step_nm} N m at {load_nm} N m");
+        }
     }
 }
 

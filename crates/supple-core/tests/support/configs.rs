@@ -105,6 +105,7 @@ fn config<const N: usize>(
             gains: Gains::isotropic(100.0, 20.0),
             inertia: ApparentInertia::Own,
             friction_velocity: FrictionVelocity::Reference,
+            measured_stribeck: false,
             inertial_feedforward: true,
             nullspace_damping_nm_s_per_rad: 2.0,
         },

@@ -6,7 +6,7 @@ use super::error::ProcedureError;
 use super::options::{DRIVES_REMEDY, HOLD_REMEDY};
 use crate::request_sequence::{Recording, Step};
 use supple_core::Vector;
-use supple_model::Description;
+use supple_model::{Description, MotorConstants};
 
 /// An arm with its controller.
 pub trait MotionArm<const N: usize> {
@@ -45,6 +45,22 @@ pub trait MotionArm<const N: usize> {
     /// # Errors
     /// If what was learned cannot be read.
     fn learned(&mut self) -> Result<Option<Description>, Self::Error>;
+
+    /// Ends the torque of the arm and gives it a weight of this mass \[kg\] at its tip: a simulated arm by itself, any other by
+    /// `attach`, which returns whether the weight is there. A model must be loaded afterwards.
+    ///
+    /// # Errors
+    /// If the arm cannot be stopped, or `attach` returns that there is no weight.
+    fn take_weight(
+        &mut self,
+        weight_kg: f64,
+        attach: &mut dyn FnMut() -> bool,
+    ) -> Result<(), Self::Error>;
+
+    /// Returns what the registers of the arm's motors state, once a model has been loaded; empty for motors without such registers.
+    fn motors(&mut self) -> Vec<MotorConstants> {
+        Vec::new()
+    }
 
     /// Runs `work` while the arm stays in its mode.
     ///

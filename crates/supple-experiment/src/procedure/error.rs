@@ -54,6 +54,24 @@ pub enum ProcedureError {
         /// Problem.
         problem: String,
     },
+    /// The weight needs more torque than the joint has.
+    #[error(
+        "a weight of {weight_kg} kg needs {torque_nm:.1} N m at {joint} in the motion with it, of {limit_nm} N m: give a lighter one \
+         with --weight-kg"
+    )]
+    HeavyWeight {
+        /// The weight \[kg\].
+        weight_kg: f64,
+        /// Name of the joint.
+        joint: String,
+        /// Torque that the joint needs \[N m\].
+        torque_nm: f64,
+        /// Its torque limit \[N m\].
+        limit_nm: f64,
+    },
+    /// Nobody attached the weight.
+    #[error("no weight was attached: continue with --resume and --weight-kg when it is at hand")]
+    NoWeight,
     /// A result cannot be written.
     #[error("cannot write {}: {error}; choose a writable folder with --out", file.display())]
     Write {

@@ -6,11 +6,13 @@ use crate::breakaway::JointBreakaway;
 use crate::calibrate::{FitOptions, SLOW_RAD_PER_S, identify_with, with_ripple_torque};
 use crate::residual_error::{ErrorInterval, error_interval_of, feedforward_residual_nm};
 use crate::scenario::STIFFNESS_N_PER_M;
+use crate::weighing_result::WeighingResult;
 use nalgebra::DMatrix;
 use std::path::Path;
 use supple_core::controller::Mode;
 use supple_core::friction::LoadTorque;
 use supple_core::{Config, RippleTable, Vector};
+use supple_ident::weigh::weigh;
 use supple_ident::{Fit, FrictionColumns, Log, Motion, ReadError};
 use supple_log::Reader;
 use supple_model::{Description, IdentifiedModel, MinimumThresholds};
@@ -232,6 +234,28 @@ pub fn fit_all<const N: usize>(
     Ok((described.with_move_collision(&thresholds)?, quality))
 }
 
+/// Estimates the torque scales from the motions of [`fit_all`] and a log with a weight of `weight_kg` \[kg\].
+///
+/// # Errors
+/// Logs that cannot be used, or that do not determine the scales.
+pub fn weigh_arm<const N: usize>(
+    model: &Description,
+    [logs, constant_speed]: &[Vec<Log>; 2],
+    weighted: &Log,
+    weight_kg: f64,
+) -> Result<WeighingResult, ProcedureError> {
+    let config = model.config::<N>()?;
+    let (fit, ripple) = identify_best(model, &config, logs, constant_speed, true)?;
+    let motor_from_joint = *supple_core::Controller::new(config)?.motor_from_joint();
+    let motion_of = |log: &Log| {
+        let log = with_ripple_torque(log, &ripple, &motor_from_joint);
+        prepared(&log, &fit)
+    };
+    let without = logs.iter().map(motion_of).collect::<Result<Vec<_>, _>>()?;
+    let found = weigh(&fit, &without, &[motion_of(weighted)?], weight_kg)?;
+    Ok(WeighingResult::new(weight_kg, &found, model.joint_names()))
+}
+
 /// Returns `model` with thresholds that its dry friction does not exceed: the collision thresholds of its joints are at least
 /// `least_nm`, up to half of their torque limits, and `plausible.against_share`, the limit for torque against a joint's
 /// acceleration, is above the dry friction: when a joint begins to move, the torque may still have the other sign by that much.
@@ -259,6 +283,7 @@ fn raise_thresholds<const N: usize>(
         tip_force_n: 0.0,
         hold_pose: false,
         load_n: 0.0,
+        stiction_factor: 1.0,
         against_share: AGAINST_TO_DRY_FRICTION * dry.max(),
         joint_tracking_error_rad: 0.0,
     };
@@ -297,6 +322,7 @@ fn fit_options(model: &Description) -> (FitOptions, Vec<FitOptions>) {
     let geared = |load: LoadTorque| FitOptions {
         friction: FrictionColumns {
             load: Some(load),
+            asymmetry: true,
             ..FrictionColumns::COULOMB_AND_OFFSET
         },
         prior_weight: GEARED_PRIOR_WEIGHT,

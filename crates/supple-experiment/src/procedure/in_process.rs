@@ -272,6 +272,15 @@ impl<const N: usize> MotionArm<N> for InProcessArm<N> {
         Ok(Some(model.with_learned(&report.terms, &report.source())?))
     }
 
+    fn take_weight(
+        &mut self,
+        weight_kg: f64,
+        _: &mut dyn FnMut() -> bool,
+    ) -> Result<(), ProcedureError> {
+        self.idle(Some(Request::Idle), IDLE_S)?;
+        Ok(self.rig()?.add_payload(weight_kg)?)
+    }
+
     fn meanwhile<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> Result<T, ProcedureError> {
         Ok(work())
     }

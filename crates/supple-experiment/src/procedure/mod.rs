@@ -4,6 +4,7 @@
 //! ```text
 //! wiring -> swept space confirmed -> warm-up -> breakaway -> first pass -> first fit (loaded)
 //!        -> full pass -> slow -> constant speed -> validation motion -> identification (loaded) -> float -> sinusoid
+//!        -> weighing, if a weight is given
 //! ```
 //!
 //! A finished step is never repeated: [`Progress`] is written after each step. The model of the first fit is loaded before the

@@ -40,6 +40,8 @@ pub struct ProcedureOptions {
     pub warm_up_s: f64,
     /// Whether an arm that falls without torque also runs at constant speeds, for torque ripple; others always do.
     pub ripple_runs: bool,
+    /// Mass of a weight with which the arm moves at the end, to fix the torque scales \[kg\]; `None` leaves that step out.
+    pub weight_kg: Option<f64>,
     /// Whether to continue after the last finished step.
     pub resume: bool,
     /// The last step to perform; `None` for all.
@@ -55,6 +57,7 @@ impl ProcedureOptions {
             candidates: 600,
             warm_up_s: 7.0,
             ripple_runs: false,
+            weight_kg: None,
             resume: false,
             until: None,
         }
@@ -68,4 +71,7 @@ pub trait Operator {
 
     /// Asks whether the arm may sweep this space, which the file `drawing` depicts.
     fn confirms(&mut self, sweep: &Sweep, drawing: &std::path::Path) -> bool;
+
+    /// Asks for a weight of this mass \[kg\] on the last link of the arm, which is without torque; returns whether it is there.
+    fn attaches_weight(&mut self, weight_kg: f64) -> bool;
 }

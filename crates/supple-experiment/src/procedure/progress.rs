@@ -5,9 +5,11 @@ use super::sweep::Sweep;
 use super::wiring::JointWiring;
 use crate::breakaway::JointBreakaway;
 use crate::residual_error::ErrorInterval;
+use crate::weighing_result::WeighingResult;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::str::FromStr;
+use supple_model::MotorConstants;
 
 /// Name of the file in the folder of the results.
 pub const FILE: &str = "calibration.json";
@@ -44,10 +46,12 @@ pub enum StepName {
     Float,
     /// Sinusoid at 5 N/m.
     Sinusoid,
+    /// Motion with a weight of known mass, which fixes the torque scales.
+    Weighing,
 }
 
 /// All steps in order, with their names in files and on the command line.
-pub const STEPS: [(&str, StepName); 13] = [
+pub const STEPS: [(&str, StepName); 14] = [
     ("wiring", StepName::Wiring),
     ("confirmed", StepName::Confirmed),
     ("warm_up", StepName::WarmUp),
@@ -61,6 +65,7 @@ pub const STEPS: [(&str, StepName); 13] = [
     ("identification", StepName::Identification),
     ("float", StepName::Float),
     ("sinusoid", StepName::Sinusoid),
+    ("weighing", StepName::Weighing),
 ];
 
 impl FromStr for StepName {
@@ -137,6 +142,9 @@ pub struct Progress {
     pub moved_s: f64,
     /// Time of motion that was predicted to the operator \[s\].
     pub stated_s: f64,
+    /// What the registers of the motors state; empty for motors without such registers, and in files of older versions.
+    #[serde(default)]
+    pub motors: Vec<MotorConstants>,
     /// Result of the wiring check of each joint.
     pub wiring: Vec<JointWiring>,
     /// Swept space.
@@ -153,6 +161,9 @@ pub struct Progress {
     pub float_ended: Option<String>,
     /// Sinusoid at 5 N/m; `None` if the arm cannot reach it.
     pub sinusoid: Option<SinusoidResult>,
+    /// Torque scales by a weight; `None` without one, and in files of older versions.
+    #[serde(default)]
+    pub weighing: Option<WeighingResult>,
 }
 
 impl Progress {

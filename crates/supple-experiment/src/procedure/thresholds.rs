@@ -23,6 +23,8 @@ const START_TIP_FORCE_N: f64 = 90.0;
 const GRAVITY_ERROR_SHARE: f64 = 1.1;
 /// Error by friction, in breakaway torques: friction acts in either direction.
 const FRICTION_ERROR_RATIO: f64 = 2.0;
+/// `plausible.stiction_factor` before the first fit: friction may be twice that of the model, and grows with the load besides.
+const STICTION_FACTOR: f64 = 3.0;
 /// Error by inertia and other terms \[N m\].
 const MARGIN_NM: f64 = 1.0;
 /// Maximum threshold as a fraction of the joint's torque limit.
@@ -54,6 +56,7 @@ pub fn minimum_thresholds<const N: usize>(
         hold_pose: has_no_brakes,
         load_n: LOAD_N,
         // Not raised for an arm with brakes: motion against the torque reveals a motor of the wrong sign.
+        stiction_factor: 1.0,
         against_share: 0.0,
         joint_tracking_error_rad: 0.0,
     };
@@ -92,6 +95,7 @@ pub fn minimum_thresholds<const N: usize>(
         joint_torque_nm: Some(threshold_nm.iter().copied().collect()),
         tip_force_n: UNCHECKED_N,
         load_n: UNCHECKED_N,
+        stiction_factor: STICTION_FACTOR,
         against_share: shares.max(),
         joint_tracking_error_rad: tracking_error_rad.min(MAX_TRACKING_ERROR_RAD),
         ..minimum

@@ -84,7 +84,7 @@ fn a_constant_torque_deflects_the_tip_by_its_force_over_the_stiffness() {
 #[test]
 fn a_joint_that_sticks_and_slips_has_an_interval_without_a_residual() {
     let config = config();
-    let upper_m = |joint: usize, excess_nm: f64| {
+    let region = |joint: usize, excess_nm: f64, measured_stribeck: bool| {
         let mut friction = config.friction;
         friction[joint] = Friction {
             breakaway_nm: 0.5 + excess_nm,
@@ -97,8 +97,18 @@ fn a_joint_that_sticks_and_slips_has_an_interval_without_a_residual() {
             ripple: None,
             source: "a test",
         });
-        let region = SinusoidRegion::<4>::new(&described.expect("an arm")).expect("four joints");
-        let region = region.expect("within reach");
+        let described = described.expect("an arm");
+        let law =
+            format!("friction_velocity = \"reference\"\nmeasured_stribeck = {measured_stribeck}");
+        let text = described
+            .toml()
+            .replace("friction_velocity = \"reference\"", &law);
+        let described = Description::from_text(&text, described.urdf()).expect("an arm");
+        let region = SinusoidRegion::<4>::new(&described).expect("four joints");
+        region.expect("within reach")
+    };
+    let upper_m = |joint: usize, excess_nm: f64| {
+        let region = region(joint, excess_nm, false);
         let residuals = DMatrix::zeros(swinging(8.0).samples(), 4);
         let motion = swinging(8.0);
         let sticking: Vec<f64> = region.sticking_joints_nm().map(|(_, nm)| nm).collect();
@@ -118,6 +128,9 @@ fn a_joint_that_sticks_and_slips_has_an_interval_without_a_residual() {
     assert!((1.0..1.6).contains(&(upper / force_m)), "{upper} {force_m}");
     // Enough damping for a smaller fall.
     assert_eq!(upper_m(ELBOW, 0.02).0, Vec::<f64>::new());
+    // The feed-forward falls with the measured speed, as the friction does.
+    let falls_too = region(ELBOW, 0.4, true);
+    assert_eq!(falls_too.sticking_joints_nm().count(), 0);
     let (resting, of_yaw_m) = upper_m(0, 0.4);
     assert!(resting.is_empty(), "{resting:?}");
     assert!(of_yaw_m < 2.0 * exact_m, "{of_yaw_m} {exact_m}");

@@ -209,6 +209,40 @@ fn the_stribeck_effect_is_fitted_in_the_second_stage_without_bias_of_the_first()
     }
 }
 
+/// Breakaway torque that differs by direction, where sliding friction does not, is found in slow motion; the columns of steady sliding
+/// are not biased by it.
+#[test]
+fn breakaway_torque_that_differs_by_direction_is_found() {
+    let truth = random_arm::<3>(31);
+    let law: [Friction; 3] = std::array::from_fn(|joint| Friction {
+        breakaway_nm: 1.2,
+        stribeck_offset_nm: [0.1, -0.05, 0.0][joint],
+        ..Friction::coulomb(1.0, 1.0)
+    });
+    let data = motion(&truth, &law, &[0, 1, 2], 3000, 4);
+    let options = Options {
+        friction: FrictionColumns {
+            stribeck_rad_per_s: Some(0.05),
+            asymmetry: true,
+            ..FrictionColumns::COULOMB_AND_OFFSET
+        },
+        consistent_prior_weight: Some(1e-6),
+        slow_rad_per_s: 0.3,
+        ..Options::default()
+    };
+    let fit = fit(&truth, &[data], &[0, 1, 2], &options).unwrap();
+    for (found, expected) in fit.friction().iter().zip(law) {
+        for (found, expected) in [
+            (found.stribeck_offset_nm, expected.stribeck_offset_nm),
+            (found.breakaway_nm, expected.breakaway_nm),
+            (found.coulomb_nm, expected.coulomb_nm),
+            (found.offset_nm, 0.0),
+        ] {
+            assert!((found - expected).abs() < 2e-3, "{found}, {expected}");
+        }
+    }
+}
+
 #[test]
 fn a_motor_coupled_to_two_joints_is_identified() {
     let truth = random_arm::<3>(41);
@@ -312,4 +346,41 @@ fn the_rank_of_an_arm_does_not_depend_on_the_log() {
         .collect();
     // Base parameters: seven for each link in general position, three for the first, whose axis is fixed.
     assert_eq!(ranks, [24, 24, 24]);
+}
+
+/// Viscous friction that differs by direction is found, and reaches the controller's friction law: without it, the offset would be
+/// right at the mean speed of the motion only.
+#[test]
+fn viscous_friction_that_differs_by_direction_is_found() {
+    let arm = random_arm::<4>(5);
+    let law = friction::<4>().map(|friction| Friction {
+        viscous_asymmetry_nm_s_per_rad: -0.2 * friction.viscous_nm_s_per_rad,
+        ..friction
+    });
+    let joints = [0, 1, 2, 3];
+    let data = [motion(&arm, &law, &joints, 600, 11)];
+    let held_out = motion(&arm, &law, &joints, 300, 12);
+    let identified = |asymmetry: bool| {
+        let options = Options {
+            friction: FrictionColumns {
+                asymmetry,
+                ..FrictionColumns::COULOMB_AND_OFFSET
+            },
+            consistent_prior_weight: None,
+            ..Options::default()
+        };
+        let found = fit(&arm, &data, &joints, &options).unwrap();
+        let left = found.validate_motion(&held_out).unwrap().total_relative;
+        (found, left)
+    };
+    let (found, left) = identified(true);
+    // The column differs from the law within the band only.
+    assert!(left < 1e-4, "{left}");
+    for (found, expected) in found.friction().iter().zip(law) {
+        let error = found.viscous_asymmetry_nm_s_per_rad - expected.viscous_asymmetry_nm_s_per_rad;
+        assert!(error.abs() < 1e-3, "{error}");
+        assert_eq!(found.validate(), Ok(()));
+    }
+    let (_, without) = identified(false);
+    assert!(without > 100.0 * left, "{without}, {left} with it");
 }

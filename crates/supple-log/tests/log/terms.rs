@@ -26,6 +26,9 @@ fn config() -> Config<N> {
     let home = common::description().home::<N>().expect("four joints");
     let friction = Friction {
         presliding_rad: 2e-3,
+        viscous_asymmetry_nm_s_per_rad: -0.01,
+        breakaway_nm: 0.07,
+        stribeck_offset_nm: 0.01,
         load_coefficient: 0.1,
         load_torque: LoadTorque::Motor,
         coulomb_at_nm: 0.2,
@@ -45,6 +48,7 @@ fn config() -> Config<N> {
         compliance_rad_per_nm: Vector::repeat(1e-5),
         ..config
     };
+    config.law.measured_stribeck = true;
     config.law.inertia = ApparentInertia::Chosen(Matrix3::identity() * 3.0);
     config.limits.position_upper_rad[0] = home[0] + 0.5 * config.limits.soft_zone_rad;
     config

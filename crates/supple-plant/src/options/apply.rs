@@ -164,6 +164,7 @@ impl PlantOptions {
             for friction in &mut config.friction {
                 friction.coulomb_nm *= 1.0 + change;
                 friction.breakaway_nm *= 1.0 + change;
+                friction.stribeck_offset_nm *= 1.0 + change;
                 friction.bristle_stiffness_nm_per_rad *= 1.0 + change;
                 friction.bristle_damping_nm_s_per_rad *= 1.0 + change;
             }
@@ -249,6 +250,7 @@ fn move_to_motors<const N: usize>(
             / config.friction[joint].coulomb_nm.max(f64::MIN_POSITIVE);
         LuGre {
             viscous_nm_s_per_rad: allowed(&|f| f.viscous_nm_s_per_rad, &square, motor),
+            viscous_asymmetry_nm_s_per_rad: 0.0,
             coulomb_nm,
             breakaway_nm: if coulomb_nm > 0.0 {
                 coulomb_nm * breakaway_factor.max(1.0)
@@ -257,6 +259,7 @@ fn move_to_motors<const N: usize>(
             },
             stribeck_rad_per_s: config.friction[joint].stribeck_rad_per_s * gear,
             offset_nm: 0.0,
+            stribeck_offset_nm: 0.0,
             bristle_stiffness_nm_per_rad: bristle,
             bristle_damping_nm_s_per_rad: bristle * BRISTLE_TIME_S,
             load_fraction: 0.0,
@@ -268,11 +271,17 @@ fn move_to_motors<const N: usize>(
             coulomb_nm += ratio[(motor, joint)] * of.coulomb_nm;
             viscous += square[(motor, joint)] * of.viscous_nm_s_per_rad;
         }
-        friction.viscous_nm_s_per_rad = (friction.viscous_nm_s_per_rad - viscous).max(0.0);
+        if friction.viscous_nm_s_per_rad > 0.0 {
+            let left_nm_s_per_rad = (friction.viscous_nm_s_per_rad - viscous).max(0.0);
+            friction.viscous_asymmetry_nm_s_per_rad *=
+                left_nm_s_per_rad / friction.viscous_nm_s_per_rad;
+            friction.viscous_nm_s_per_rad = left_nm_s_per_rad;
+        }
         if friction.coulomb_nm > 0.0 {
             let left = (friction.coulomb_nm - coulomb_nm).max(0.0) / friction.coulomb_nm;
             friction.coulomb_nm *= left;
             friction.breakaway_nm *= left;
+            friction.stribeck_offset_nm *= left;
             friction.bristle_stiffness_nm_per_rad *= left;
             friction.bristle_damping_nm_s_per_rad *= left;
         }

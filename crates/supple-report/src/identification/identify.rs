@@ -1,7 +1,6 @@
 //! `supple identify`: identifies a model from logs; the controller can load it.
 
 use super::report::{ReportInput, Summary, html, summary};
-use super::weighing::WeighingResult;
 use crate::progress::Steps;
 use std::path::Path;
 use supple_cli::arguments::{EffectsArg, IdentifyArgs, TorqueDelay};
@@ -10,6 +9,7 @@ use supple_cli::console::{json, print_line};
 use supple_cli::exit::Failure;
 use supple_cli::out::Staging;
 use supple_core::Arm;
+use supple_experiment::WeighingResult;
 use supple_experiment::predict_tracking_error;
 use supple_ident::weigh::weigh;
 use supple_ident::{

@@ -10,7 +10,6 @@ mod learn;
 mod paper;
 mod report;
 mod requested_joints;
-mod weighing;
 
 use supple_cli::arguments::{ExciteCommand, IdentificationCommand};
 use supple_cli::exit::Failure;

@@ -1,11 +1,11 @@
 //! Report of an identification: one self-contained HTML file, and its summary.
 
-use super::weighing::WeighingResult;
 use crate::figures::identification::{Curves, curves};
 use askama::Template;
 use serde::Serialize;
 use supple_cli::exit::Failure;
 use supple_core::Friction;
+use supple_experiment::WeighingResult;
 use supple_experiment::scenario::STIFFNESS_N_PER_M;
 use supple_experiment::{ErrorInterval, NO_INTERVAL, TrackingPrediction, error_interval_of};
 use supple_ident::{DMatrix, Fit, Motion, Validation};
@@ -113,12 +113,16 @@ pub struct JointFriction {
     pub joint: String,
     /// `V`.
     pub viscous_nm_s_per_rad: f64,
+    /// `A`, half of the difference of the viscous friction between the positive and the negative direction \[N m s/rad\].
+    pub viscous_asymmetry_nm_s_per_rad: f64,
     /// `S`.
     pub coulomb_nm: f64,
     /// `S_0`.
     pub breakaway_nm: f64,
     /// Offset.
     pub offset_nm: f64,
+    /// `O_s`, torque at rest in addition to the offset \[N m\].
+    pub stribeck_offset_nm: f64,
     /// `v_s`, the speed over which friction falls from `S_0` to `S` \[rad/s\].
     pub stribeck_rad_per_s: f64,
     /// Dry friction for each newton metre of load.
@@ -215,9 +219,11 @@ pub fn summary<const N: usize>(input: &ReportInput<'_, N>) -> Summary {
             .map(|j| JointFriction {
                 joint: names[j].clone(),
                 viscous_nm_s_per_rad: friction[j].viscous_nm_s_per_rad,
+                viscous_asymmetry_nm_s_per_rad: friction[j].viscous_asymmetry_nm_s_per_rad,
                 coulomb_nm: friction[j].coulomb_nm,
                 breakaway_nm: friction[j].breakaway_nm,
                 offset_nm: friction[j].offset_nm,
+                stribeck_offset_nm: friction[j].stribeck_offset_nm,
                 stribeck_rad_per_s: friction[j].stribeck_rad_per_s,
                 load_coefficient: friction[j].load_coefficient,
                 presliding_rad: friction[j].presliding_rad,

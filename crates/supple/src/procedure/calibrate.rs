@@ -53,6 +53,7 @@ pub fn run(args: &CalibrateArgs, on: CalibrationPlant) -> Result<(), Failure> {
     let options = ProcedureOptions {
         warm_up_s: args.warm_up,
         ripple_runs: args.ripple_runs,
+        weight_kg: args.weight_kg,
         candidates: args.candidates,
         resume: args.resume,
         until: args.until,

@@ -65,6 +65,14 @@ pub fn print(found: &CalibratedArm, out: &Path, json: bool) -> Result<(), Failur
             print_line(&format!("a fault ended the sinusoid: {fault}"))?;
         }
     }
+    if let Some(weighing) = &progress.weighing {
+        for line in weighing.lines() {
+            print_line(&line)?;
+        }
+        print_line(
+            "for true newtons multiply torque_scale of each motor in [bus] by its ratio, and calibrate again",
+        )?;
+    }
     print_line(&format!("model: {}", out.display()))?;
     let learned = progress
         .sinusoid

@@ -14,11 +14,11 @@ use supple_core::codes::fault_kind;
 use supple_core::controller::{Mode, Request};
 use supple_experiment::Step;
 use supple_experiment::procedure::{
-    Motion, MotionArm, PerformedMotion, StopCause, Stopped, moves_joints,
+    Motion, MotionArm, PerformedMotion, ProcedureError, StopCause, Stopped, moves_joints,
 };
 use supple_ipc::message::{Drives, OperatorReply, Telemetry};
 use supple_ipc::{Domain, TelemetryReader};
-use supple_model::Description;
+use supple_model::{Description, MotorConstants};
 use supple_plant::PlantOptions;
 use supple_realtime::{Stop, pause};
 
@@ -43,6 +43,9 @@ const REST_S: f64 = 1.5;
 
 /// A system of processes with its arm.
 pub struct RunningArm<const N: usize> {
+    args: UpArgs,
+    description: Description,
+    domain: Domain,
     plan: Plan,
     children: ChildProcesses,
     reader: TelemetryReader,
@@ -82,6 +85,9 @@ impl<const N: usize> RunningArm<N> {
     ) -> Result<Self, Failure> {
         let out = std::path::absolute(out).map_err(|error| Failure::file("find", out, error))?;
         Ok(RunningArm {
+            args: args.clone(),
+            description: description.clone(),
+            domain: domain.clone(),
             plan: Plan::new(args, description, domain, None)?,
             children: ChildProcesses::default(),
             reader: TelemetryReader::for_log(domain).map_err(Failure::system)?,
@@ -495,6 +501,14 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
         self.activate(unless_idle_since)
     }
 
+    fn motors(&mut self) -> Vec<MotorConstants> {
+        match self.description.bus() {
+            // Without the file, as of an older program on the bus, the calibration lacks these numbers only.
+            Some(_) => MotorConstants::read(&self.domain.motors_file()).unwrap_or_default(),
+            None => Vec::new(),
+        }
+    }
+
     fn position_rad(&mut self) -> Result<Vector<N>, Failure> {
         // Telemetry may be queued; the last one has the present position.
         let mut waiting = 0;
@@ -561,6 +575,28 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
             &found.learned,
             source.unwrap_or("learned while moving"),
         )?))
+    }
+
+    fn take_weight(
+        &mut self,
+        weight_kg: f64,
+        attach: &mut dyn FnMut() -> bool,
+    ) -> Result<(), Failure> {
+        if !self.starts {
+            return Err(Failure::WeightNeedsOwnSystem);
+        }
+        self.end()?;
+        self.loaded = false;
+        if self.plant == PlantKind::Can {
+            return match attach() {
+                true => Ok(()),
+                false => Err(ProcedureError::NoWeight.into()),
+            };
+        }
+        let spec = format!("payload:mass-kg={weight_kg}");
+        self.args.inject.push(spec.parse()?);
+        self.plan = Plan::new(&self.args, &self.description, &self.domain, None)?;
+        Ok(())
     }
 
     fn meanwhile<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> Result<T, Failure> {

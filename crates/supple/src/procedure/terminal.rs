@@ -28,4 +28,10 @@ impl Operator for Terminal {
             drawing.display()
         ))
     }
+
+    fn attaches_weight(&mut self, weight_kg: f64) -> bool {
+        confirm(&format!(
+            "the arm is without torque: is the weight of {weight_kg} kg attached to its last link, as firmly as a tool?"
+        ))
+    }
 }

@@ -3,6 +3,7 @@
 use supple_can_frame::{CanFrame, FrameFormat};
 use supple_damiao::feedback::Feedback;
 use supple_damiao::guard::{MotorFault as Found, MotorGuard};
+use supple_damiao::inspection::TorqueRegisters;
 use supple_damiao::mit::{KD, MitCodes};
 use supple_damiao::position::JointAngle;
 use supple_damiao::temperature::{TemperatureLevel, TemperatureLimits};
@@ -26,8 +27,8 @@ pub struct Motor {
     pub torque_limit_nm: f64,
     /// Temperature limits.
     pub thermal: TemperatureLimits,
-    /// Torque over current that the motor's registers state \[N m/A\].
-    pub torque_constant_nm_per_a: f64,
+    /// Registers that state its torque over current.
+    pub torque_registers: TorqueRegisters,
 }
 
 /// A motor with its state in the cycle.

@@ -6,12 +6,13 @@ use super::error::DamiaoError;
 use super::start_up::{differing_torque_constants, rates, start_up};
 use crate::options::{Options, print_budget};
 use crate::run::{Startup, run_arm};
+use std::path::PathBuf;
 use supple_bus::{Bus, BusError};
 use supple_can_frame::BitRates;
 use supple_core::{Config, Vector};
 use supple_drive::{Counters, CycleConfig, Link, PlantLoop, SharedMemoryLink, StowConfig};
 use supple_ipc::Domain;
-use supple_model::{Description, with_dof};
+use supple_model::{Description, MotorConstants, with_dof};
 use supple_realtime::{Stop, diagnostics};
 
 /// Speed of the joints while the arm is laid down \[rad/s\].
@@ -101,6 +102,7 @@ fn run_joints<const N: usize>(
         description,
         config: &config,
         cycle_config,
+        motors_file: domain.motors_file(),
     };
     run_arm(&mut startup, &domain, &config, options, stop).map(Some)
 }
@@ -110,6 +112,30 @@ struct Motors<'a, const N: usize> {
     description: &'a Description,
     config: &'a Config<N>,
     cycle_config: CycleConfig,
+    motors_file: PathBuf,
+}
+
+impl<const N: usize> Motors<'_, N> {
+    /// Stores what the registers state, for a calibration. The arm runs without this file, too.
+    fn store(&self, motors: &[Motor; N]) {
+        let described = self.description.bus().into_iter();
+        let described = described.flat_map(|bus| bus.motors.iter());
+        let constants = described.zip(motors).map(|(described, motor)| {
+            let registers = &motor.torque_registers;
+            MotorConstants {
+                joint: described.joint.clone(),
+                model: described.model.clone(),
+                kt_nm_per_a: registers.kt_nm_per_a,
+                pole_pairs: registers.pole_pairs,
+                flux_wb: registers.flux_wb,
+                gear_ratio: registers.gear_ratio,
+                torque_constant_nm_per_a: registers.torque_constant_nm_per_a(),
+            }
+        });
+        if let Err(error) = MotorConstants::write(&self.motors_file, constants.collect()) {
+            diagnostics::post(format_args!("supple-can: warning: {error}"));
+        }
+    }
 }
 
 impl<const N: usize> Startup<N> for Motors<'_, N> {
@@ -126,6 +152,7 @@ impl<const N: usize> Startup<N> for Motors<'_, N> {
         let stop_requested = || stop.shutdown_requested();
         let motors = start_up::<N, _>(bus, self.description, &stop_requested)?;
         report_torque_constants(&motors, self.description);
+        self.store(&motors);
         diagnostics::post(format_args!(
             "supple-can: {N} motors ready; the arm has no brakes: support it, or let it lie, until gravity hold"
         ));
@@ -174,7 +201,7 @@ fn report_torque_constants<const N: usize>(motors: &[Motor; N], description: &De
     };
     let constants: Vec<String> = motors
         .iter()
-        .map(|motor| format!("{:.3}", motor.torque_constant_nm_per_a))
+        .map(|motor| format!("{:.3}", motor.torque_registers.torque_constant_nm_per_a()))
         .collect();
     diagnostics::post(format_args!(
         "supple-can: torque constants by the motors' registers: {} N m/A",
@@ -182,7 +209,8 @@ fn report_torque_constants<const N: usize>(motors: &[Motor; N], description: &De
     ));
     for (joint, first) in differing_torque_constants(motors, bus) {
         let names = [joint, first].map(|index| bus.motors[index].joint.as_str());
-        let [own, other] = [joint, first].map(|index| motors[index].torque_constant_nm_per_a);
+        let [own, other] =
+            [joint, first].map(|index| motors[index].torque_registers.torque_constant_nm_per_a());
         diagnostics::post(format_args!(
             "supple-can: warning: by its registers the {} of {} has {own:.3} N m/A, that of {} {other:.3}: check its calibration with \
              `supple motors`; a weight of known mass shows its true torque",

@@ -125,7 +125,7 @@ pub fn start_up<const N: usize, B: Bus>(
             torque_scale: motor.torque_scale,
             torque_limit_nm: limits.joint_torque_nm[joint],
             thermal,
-            torque_constant_nm_per_a: readings.torque_constant_nm_per_a().unwrap_or_default(),
+            torque_registers: readings.torque_registers().ok_or_else(no_motors)?,
         });
     }
     motors.try_into().map_err(|_| no_motors())
@@ -146,7 +146,8 @@ pub fn differing_torque_constants<const N: usize>(
     };
     let differs = |joint: &usize| {
         let first = first_of(*joint)?;
-        let [own, other] = [*joint, first].map(|index| motors[index].torque_constant_nm_per_a);
+        let [own, other] =
+            [*joint, first].map(|index| motors[index].torque_registers.torque_constant_nm_per_a());
         ((own - other).abs() > CONSTANT_TOLERANCE * other).then_some((*joint, first))
     };
     (0..N).filter_map(|joint| differs(&joint)).collect()

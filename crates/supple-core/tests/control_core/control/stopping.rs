@@ -143,6 +143,7 @@ fn config<const N: usize>(case: &Case) -> Config<N> {
             gains: Gains::isotropic(50.0, 2.0),
             inertia: ApparentInertia::Own,
             friction_velocity: FrictionVelocity::Reference,
+            measured_stribeck: false,
             inertial_feedforward: true,
             nullspace_damping_nm_s_per_rad: 1.0,
         },
@@ -190,6 +191,7 @@ fn config<const N: usize>(case: &Case) -> Config<N> {
         plausible: PlausibilityLimits {
             lost_replies: 3,
             stuck_rad: 0.1,
+            stiction_factor: 1.0,
             against_share: 0.05,
             load_n: 8.0,
         },

@@ -6,7 +6,7 @@ use crate::support::property::{check, vector3};
 use crate::support::states::{Scene, scene};
 use proptest::prelude::*;
 use supple_core::config::{FrictionVelocity, Gains, Law, Role};
-use supple_core::impedance::SINGULAR_BELOW_M;
+use supple_core::impedance::{LawInput, PositionTarget, SINGULAR_BELOW_M, impedance};
 use supple_core::{Friction, Vector};
 
 fn law(friction_velocity: FrictionVelocity) -> Law {
@@ -160,4 +160,65 @@ fn the_residual_friction_damps_the_error() {
         prop_assert!(power <= 1e-12, "{power} W");
         Ok(())
     });
+}
+
+/// With a Stribeck effect at another velocity, the feed-forward has the friction of that speed in the direction of the reference: it falls
+/// while the joint moves faster and gains no more than the breakaway torque while it rests. At the same velocity, it has the same bits.
+#[test]
+fn the_stribeck_effect_may_follow_another_velocity() {
+    let config = four();
+    let model: [Friction; 4] = friction().map(|friction| Friction {
+        breakaway_nm: friction.coulomb_nm + 0.3,
+        stribeck_offset_nm: -0.05,
+        ..friction
+    });
+    check(
+        300,
+        (scene::<4>(), 0.0..0.5, 0.0..0.5),
+        |(scene, slow, more)| {
+            let task = scene.task(&config.arm, &config.roles);
+            if task.min_singular_value_m < SINGULAR_BELOW_M {
+                return Ok(());
+            }
+            let reference = task.inverse * scene.reference.velocity;
+            let at = |velocity: &Vector<4>| {
+                let target = PositionTarget {
+                    reference: &scene.reference,
+                    gains: &scene.gains,
+                    spring_limit_n: f64::INFINITY,
+                };
+                let input = LawInput {
+                    friction: Some((&model, FrictionVelocity::Reference)),
+                    stribeck_velocity_rad_per_s: Some(velocity),
+                    ..LawInput::new(target, &scene.qd)
+                };
+                impedance(&config.roles, &scene.terms(&config.arm), &task, &input).friction
+            };
+            let whole: Vec<f64> = (0..4).map(|i| model[i].torque_nm(reference[i])).collect();
+            prop_assert_eq!(at(&reference), Vector::<4>::from_column_slice(&whole));
+            let (rest, slower, faster) = (
+                at(&Vector::zeros()),
+                at(&Vector::repeat(slow)),
+                at(&Vector::repeat(slow + more)),
+            );
+            for i in (0..4).filter(|i| config.roles[*i] == Role::Active) {
+                let direction = model[i].direction(reference[i]);
+                // The offset that falls has the same sign for both directions of motion.
+                let dry = |torque: &Vector<4>, velocity: f64| {
+                    (torque[i] - model[i].offset_at_nm(velocity)) * direction.signum()
+                };
+                let (rest, slower, faster) = (
+                    dry(&rest, 0.0),
+                    dry(&slower, slow),
+                    dry(&faster, slow + more),
+                );
+                prop_assert!(
+                    rest >= slower && slower >= faster,
+                    "{rest} {slower} {faster}"
+                );
+                prop_assert!(rest - faster <= 0.3 + 1e-12);
+            }
+            Ok(())
+        },
+    );
 }

@@ -20,6 +20,7 @@ fn whole_law() -> Law {
         gains: Gains::isotropic(0.0, 0.0),
         inertia: ApparentInertia::Chosen(Matrix3::from_diagonal_element(3.0)),
         friction_velocity: FrictionVelocity::Reference,
+        measured_stribeck: false,
         inertial_feedforward: true,
         nullspace_damping_nm_s_per_rad: 2.0,
     }

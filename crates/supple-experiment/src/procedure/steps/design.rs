@@ -39,7 +39,9 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         let unknown = match stage {
             ModelStage::Start => true,
             ModelStage::Given => false,
-            ModelStage::First | ModelStage::Identified => self.progress.first_fit.is_none(),
+            ModelStage::First | ModelStage::Identified | ModelStage::Weighted => {
+                self.progress.first_fit.is_none()
+            }
         };
         let plan = DesignPlan {
             seed: self.options.seed,

@@ -9,6 +9,30 @@ use crate::procedure::{FIRST_MODEL, LOGS, fitting};
 use std::path::PathBuf;
 use supple_ident::Log;
 
+/// Files of the motions to which a model is fitted.
+pub(super) struct FittedFiles {
+    excitations: [PathBuf; 3],
+    /// Motion at constant speeds, to which the ripple is fitted.
+    constant_speed: Option<PathBuf>,
+}
+
+impl FittedFiles {
+    /// Reads the excitations, and the motions at constant speed.
+    pub(super) fn read<const N: usize>(&self) -> Result<[Vec<Log>; 2], ProcedureError> {
+        let read = |files: &[PathBuf]| {
+            let mut logs = Vec::new();
+            for file in files {
+                logs.extend(fitting::read_excitations::<N>(file)?);
+            }
+            Ok::<_, ProcedureError>(logs)
+        };
+        Ok([
+            read(&self.excitations)?,
+            read(self.constant_speed.as_slice())?,
+        ])
+    }
+}
+
 impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
     /// Returns the path of the log of a finished step.
     pub(super) fn log_file(&self, step: StepName) -> PathBuf {
@@ -60,6 +84,21 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         Ok(self.finish(StepName::FirstFit, self.progress.moved_s, None)?)
     }
 
+    /// Returns the files of the motions that are fitted.
+    pub(super) fn fitted_files(&self) -> FittedFiles {
+        let constant_speed = self.progress.finished(StepName::ConstantSpeed);
+        let moved = constant_speed.is_some_and(|finished| finished.log.is_some());
+        FittedFiles {
+            excitations: [
+                StepName::FullPass,
+                StepName::SlowMotion,
+                StepName::FirstPass,
+            ]
+            .map(|step| self.log_file(step)),
+            constant_speed: moved.then(|| self.log_file(StepName::ConstantSpeed)),
+        }
+    }
+
     pub(super) fn identification(&mut self) -> Result<(), A::Error> {
         if self.is_done(StepName::Identification, "identification") {
             return Ok(());
@@ -67,24 +106,16 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         let model = self.model(ModelStage::First)?;
         let file = |step| self.log_file(step);
         let [full, slow] = [StepName::FullPass, StepName::SlowMotion].map(file);
-        let [first, constant] = [StepName::FirstPass, StepName::ConstantSpeed].map(file);
-        let constant_speed = self.progress.finished(StepName::ConstantSpeed);
-        let has_constant = constant_speed.is_some_and(|finished| finished.log.is_some());
+        let fitted = self.fitted_files();
         let validation = self.log_file(StepName::ValidationMotion);
         let start = self.start.clone();
         // Reading and fitting take long; the arm's telemetry must be read meanwhile.
         let (found, quality) = self.arm.meanwhile(move || {
-            let (mut logs, mut others) = (Vec::new(), Vec::new());
-            for file in [&full, &slow, &first] {
-                logs.extend(fitting::read_excitations::<N>(file)?);
-            }
+            let [logs, constant] = fitted.read::<N>()?;
+            let mut others = Vec::new();
             for file in [&full, &slow, &validation] {
                 others.extend(fitting::read_position_controlled_motions::<N>(file)?);
             }
-            let constant = match has_constant {
-                true => fitting::read_excitations::<N>(&constant)?,
-                false => Vec::new(),
-            };
             let validation = single_log(
                 &fitting::read_excitations::<N>(&validation)?,
                 "validation-motion",
@@ -117,7 +148,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
     }
 }
 
-fn single_log<'a>(logs: &'a [Log], name: &str) -> Result<&'a Log, ProcedureError> {
+pub(super) fn single_log<'a>(logs: &'a [Log], name: &str) -> Result<&'a Log, ProcedureError> {
     logs.first().ok_or_else(|| ProcedureError::Stopped {
         motion: name.to_owned(),
         fault: "its log has no motion along a series".to_owned(),

@@ -6,6 +6,7 @@ pub mod hold_check;
 mod passes;
 pub mod single;
 mod trials;
+mod weighing;
 mod wiring;
 
 use crate::excite::move_to;
@@ -62,6 +63,8 @@ enum ModelStage {
     Start,
     First,
     Identified,
+    /// The identified model with the weight, with which all joints move.
+    Weighted,
 }
 
 struct Run<'a, const N: usize, A> {
@@ -191,7 +194,12 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
                 return Ok(());
             }
         }
-        for step in [Self::identification, Self::float, Self::sinusoid] {
+        for step in [
+            Self::identification,
+            Self::float,
+            Self::sinusoid,
+            Self::weighing,
+        ] {
             if self.is_over() {
                 return Ok(());
             }
@@ -213,6 +221,7 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             ModelStage::Start => self.start.with_all_joints_active()?,
             ModelStage::First => load(self.options.out.join(FIRST_MODEL))?,
             ModelStage::Identified => load(self.options.out.clone())?,
+            ModelStage::Weighted => self.weighted()?,
         })
     }
 
@@ -229,8 +238,13 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
             text_of(stage)
         ));
         let mut model = self.model(stage)?;
-        if matches!(stage, ModelStage::Start | ModelStage::First) {
-            let unknown = stage == ModelStage::Start || self.progress.first_fit.is_none();
+        if matches!(
+            stage,
+            ModelStage::Start | ModelStage::First | ModelStage::Weighted
+        ) {
+            // In command units the weight is heavier by the ratio of commanded to true torque, which is unknown.
+            let unknown = matches!(stage, ModelStage::Start | ModelStage::Weighted)
+                || self.progress.first_fit.is_none();
             let mut minimum = minimum_thresholds::<N>(&model, unknown)?;
             if let (ModelStage::First, Some(gains)) = (stage, &self.first_gains) {
                 minimum.joint_tracking_error_rad =
@@ -247,6 +261,9 @@ impl<'a, const N: usize, A: MotionArm<N>> Run<'a, N, A> {
         }
         self.arm.load(&model)?;
         self.loaded = Some(stage);
+        if self.progress.motors.is_empty() {
+            self.progress.motors = self.arm.motors();
+        }
         Ok(())
     }
 
@@ -341,6 +358,7 @@ fn name_of(stage: ModelStage) -> &'static str {
         ModelStage::Start => "start",
         ModelStage::First => "full-pass",
         ModelStage::Identified => "float",
+        ModelStage::Weighted => "weighing",
     }
 }
 
@@ -349,5 +367,6 @@ fn text_of(stage: ModelStage) -> &'static str {
         ModelStage::Given | ModelStage::Start => "given model",
         ModelStage::First => "model of the first pass",
         ModelStage::Identified => "identified model",
+        ModelStage::Weighted => "identified model and the weight",
     }
 }

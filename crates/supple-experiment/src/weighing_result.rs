@@ -1,10 +1,10 @@
-//! Torque scales by a weight of known mass, as `supple identify` reports them.
+//! Torque scales by a weight of known mass, as a calibration and `supple identify` report them.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use supple_ident::weigh::Weighing;
 
 /// Torque scales by a weight of known mass, and its centre of mass, with standard deviations.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WeighingResult {
     /// Mass of the weight \[kg\].
     pub weight_kg: f64,
@@ -19,7 +19,7 @@ pub struct WeighingResult {
 }
 
 /// Torque scale of a joint.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointTorqueScale {
     /// Name of the joint.
     pub joint: String,
