@@ -387,10 +387,13 @@ fn fit_stribeck(columns: &Columns, parts: &[Vec<JointRows>], x: &mut DVector<f64
             continue;
         }
         let weights = speed_weights(&speeds, reach);
-        // The mean of the residuals is a nuisance.
-        let fitted = |columns: &[&dyn Fn(&[f64; 2]) -> f64]| {
+        // Each column is this sum of the shapes of `B` and `O`. The mean of the residuals is a nuisance.
+        let fitted = |columns: &[[f64; 2]]| {
             let a = DMatrix::from_fn(shapes.len(), 1 + columns.len(), |i, c| {
-                weights[i].sqrt() * c.checked_sub(1).map_or(1.0, |c| columns[c](&shapes[i]))
+                let shape = c.checked_sub(1).map_or(1.0, |c| {
+                    columns[c][0] * shapes[i][0] + columns[c][1] * shapes[i][1]
+                });
+                weights[i].sqrt() * shape
             });
             let b = torques_nm.iter().zip(&weights);
             normal_solution(
@@ -399,19 +402,17 @@ fn fit_stribeck(columns: &Columns, parts: &[Vec<JointRows>], x: &mut DVector<f64
             )
         };
         // The excess of each direction, B + O and B - O, is not negative.
-        let positive = |of: &[f64; 2]| 0.5 * (of[0] + of[1]);
-        let negative = |of: &[f64; 2]| 0.5 * (of[0] - of[1]);
-        let both = offset.and_then(|_| fitted(&[&positive, &negative]));
-        let alone = |of: &dyn Fn(&[f64; 2]) -> f64| fitted(&[of]).map_or(0.0, |x| x[1].max(0.0));
+        let (positive, negative) = ([0.5, 0.5], [0.5, -0.5]);
+        let both = offset.and_then(|_| fitted(&[positive, negative]));
+        let alone = |column: [f64; 2]| fitted(&[column]).map_or(0.0, |x| x[1].max(0.0));
         let excess_nm = both.map(|both| match (both[1] < 0.0, both[2] < 0.0) {
             (false, false) => [both[1], both[2]],
-            (false, true) => [alone(&positive), 0.0],
-            (true, false) => [0.0, alone(&negative)],
+            (false, true) => [alone(positive), 0.0],
+            (true, false) => [0.0, alone(negative)],
             (true, true) => [0.0; 2],
         });
         // One direction alone does not tell them apart.
-        let [positive_nm, negative_nm] =
-            excess_nm.unwrap_or_else(|| [alone(&|of: &[f64; 2]| of[0]); 2]);
+        let [positive_nm, negative_nm] = excess_nm.unwrap_or_else(|| [alone([1.0, 0.0]); 2]);
         x[stribeck] = 0.5 * (positive_nm + negative_nm);
         if let Some(offset) = offset {
             x[offset] = 0.5 * (positive_nm - negative_nm);

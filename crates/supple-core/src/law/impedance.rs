@@ -26,7 +26,7 @@ use crate::config::{ApparentInertia, FrictionVelocity, Law, Role};
 use crate::dynamics::Terms;
 use crate::law::task::count_active;
 use crate::math::linalg::Cholesky;
-use crate::math::{Matrix, Vector, Vector3};
+use crate::math::{Matrix, Vector, Vector3, abs};
 use crate::model::friction::Friction;
 use crate::model::pose::Pose;
 use Effect::{Acceleration, Force, Reaction, Torque};
@@ -122,19 +122,30 @@ pub struct HeldFriction<'a, const N: usize> {
 
 impl<const N: usize> HeldFriction<'_, N> {
     /// Returns the feed-forward of `joint` at `velocity_rad_per_s` with dry friction in the `direction` of the measured motion; offset
-    /// and magnitude of the dry friction are given as long as nothing is kept \[N m\]. Requires presliding.
+    /// and magnitude of the dry friction are given as long as nothing is kept \[N m\]. A joint that is known to move faster than its
+    /// reference did keeps neither: more friction than it has would drive it. Requires presliding.
     fn in_direction_nm(
         &self,
         friction: &Friction,
         joint: usize,
         velocity_rad_per_s: f64,
+        measured_rad_per_s: Option<f64>,
         (offset_nm, dry_nm): (f64, f64),
         direction: f64,
     ) -> f64 {
-        let kept_nm = friction.dry_size_nm(self.velocity_rad_per_s[joint]);
+        let kept_rad_per_s = self.velocity_rad_per_s[joint];
+        let is_faster =
+            measured_rad_per_s.is_some_and(|measured| abs(measured) > abs(kept_rad_per_s));
+        let kept_nm = match is_faster {
+            true => (offset_nm, dry_nm),
+            false => (
+                friction.offset_at_nm(kept_rad_per_s),
+                friction.dry_size_nm(kept_rad_per_s),
+            ),
+        };
         self.viscous_share * friction.viscous_torque_nm(velocity_rad_per_s)
-            + self.offset_nm(friction, joint, offset_nm)
-            + (dry_nm + self.weight * (kept_nm - dry_nm)) * direction
+            + (offset_nm + self.weight * (kept_nm.0 - offset_nm))
+            + (dry_nm + self.weight * (kept_nm.1 - dry_nm)) * direction
     }
 
     /// Returns the offset of `joint`, which is `offset_nm` as long as nothing is kept.
@@ -267,10 +278,11 @@ pub(super) fn add_law_terms<T: Target<D>, F: TermSink<N, D>, const N: usize, con
                 FrictionVelocity::Measured if is_active(i) => input.velocity_rad_per_s[i],
                 _ => reference[i],
             };
-            let stribeck_velocity = match input.stribeck_velocity_rad_per_s {
-                Some(of) if is_active(i) => of[i],
-                _ => velocity,
+            let measured = match input.stribeck_velocity_rad_per_s {
+                Some(of) if is_active(i) => Some(of[i]),
+                _ => None,
             };
+            let stribeck_velocity = measured.unwrap_or(velocity);
             let (friction, share) = (&friction[i], input.friction_share);
             let size_nm = friction.dry_size_nm(stribeck_velocity);
             let direction = match input.dry_direction {
@@ -283,7 +295,8 @@ pub(super) fn add_law_terms<T: Target<D>, F: TermSink<N, D>, const N: usize, con
             match &input.held_friction {
                 None => torque_nm,
                 Some(held) if input.dry_direction.is_some() && friction.presliding_rad > 0.0 => {
-                    held.in_direction_nm(friction, i, velocity, (offset_nm, size_nm), direction)
+                    let present = (offset_nm, size_nm);
+                    held.in_direction_nm(friction, i, velocity, measured, present, direction)
                 }
                 Some(held) => {
                     let present = (offset_nm, dry_nm);

@@ -6,7 +6,7 @@ use crate::support::property::{check, vector3};
 use crate::support::states::{Scene, scene};
 use proptest::prelude::*;
 use supple_core::config::{FrictionVelocity, Gains, Law, Role};
-use supple_core::impedance::{LawInput, PositionTarget, SINGULAR_BELOW_M, impedance};
+use supple_core::impedance::{HeldFriction, LawInput, PositionTarget, SINGULAR_BELOW_M, impedance};
 use supple_core::{Friction, Vector};
 
 fn law(friction_velocity: FrictionVelocity) -> Law {
@@ -217,6 +217,55 @@ fn the_stribeck_effect_may_follow_another_velocity() {
                     "{rest} {slower} {faster}"
                 );
                 prop_assert!(rest - faster <= 0.3 + 1e-12);
+            }
+            Ok(())
+        },
+    );
+}
+
+/// In contact a joint that moves faster than its reference did keeps no more friction than that of its own speed; one that moves slower
+/// keeps that of its reference, not the breakaway torque of a joint at rest.
+#[test]
+fn friction_in_contact_does_not_drive_a_joint() {
+    let config = four();
+    let model: [Friction; 4] = friction().map(|friction| Friction {
+        breakaway_nm: friction.coulomb_nm + 0.3,
+        presliding_rad: 1e-3,
+        ..friction
+    });
+    check(
+        300,
+        (scene::<4>(), 0.0..0.5, 0.0..0.5, -1.0..1.0),
+        |(scene, kept, measured, direction)| {
+            let task = scene.task(&config.arm, &config.roles);
+            let directions = Vector::repeat(direction);
+            let kept_velocity = Vector::repeat(kept);
+            let at = |measured: f64| {
+                let measured = Vector::repeat(measured);
+                let target = PositionTarget {
+                    reference: &scene.reference,
+                    gains: &scene.gains,
+                    spring_limit_n: f64::INFINITY,
+                };
+                let input = LawInput {
+                    friction: Some((&model, FrictionVelocity::Reference)),
+                    stribeck_velocity_rad_per_s: Some(&measured),
+                    dry_direction: Some(&directions),
+                    held_friction: Some(HeldFriction {
+                        velocity_rad_per_s: &kept_velocity,
+                        weight: 1.0,
+                        viscous_share: 0.0,
+                    }),
+                    ..LawInput::new(target, &scene.qd)
+                };
+                impedance(&config.roles, &scene.terms(&config.arm), &task, &input).friction
+            };
+            let (forward, backward) = (at(measured), at(-measured));
+            prop_assert_eq!(forward, backward);
+            for i in (0..4).filter(|i| config.roles[*i] == Role::Active) {
+                let dry_nm = (forward[i] - model[i].offset_nm) * direction.signum();
+                let size_nm = model[i].dry_size_nm(measured.max(kept)) * direction.abs();
+                prop_assert!((dry_nm - size_nm).abs() < 1e-12, "joint {}", i + 1);
             }
             Ok(())
         },
