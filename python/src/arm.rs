@@ -723,6 +723,10 @@ impl Arm {
     /// friction : {"reference", "measured"}, optional
     ///     Adds the feed-forward of :attr:`friction` at the joint velocities of the reference, as the controller does,
     ///     or at ``qd``. Default: none.
+    /// stribeck_velocity : array_like, (..., N), optional
+    ///     Joint velocities for the Stribeck effect of active joints (rad/s), with ``friction="reference"``: the controller
+    ///     of an arm whose description has ``measured_stribeck`` (OpenArm, YAM) uses the measured ones, averaged over 50 ms.
+    ///     Default: as the rest of the friction.
     /// active_joints : sequence of bool, (N,), optional
     ///     Joints on which the law acts; at least ``d``. The others get ``G + C qd``, friction and the coupling torque.
     ///     Default: :attr:`active_joints`.
@@ -761,7 +765,7 @@ impl Arm {
     /// >>> bool(np.allclose(tau, arm.gravity(q)))
     /// True
     #[pyo3(signature = (q, qd, reference, velocity = None, acceleration = None, *, stiffness, damping,
-        friction = None, active_joints = None, nullspace_damping = None, nullspace_torque = None,
+        friction = None, stribeck_velocity = None, active_joints = None, nullspace_damping = None, nullspace_torque = None,
         apparent_inertia = None, force = None, out = None))]
     #[expect(
         clippy::too_many_arguments,
@@ -778,6 +782,7 @@ impl Arm {
         stiffness: &Bound<'py, PyAny>,
         damping: &Bound<'py, PyAny>,
         friction: Option<&str>,
+        stribeck_velocity: Option<&Bound<'py, PyAny>>,
         active_joints: Option<Vec<bool>>,
         nullspace_damping: Option<&Bound<'py, PyAny>>,
         nullspace_torque: Option<&Bound<'py, PyAny>>,
@@ -794,6 +799,7 @@ impl Arm {
             stiffness,
             damping,
             friction,
+            stribeck_velocity,
             active_joints,
             nullspace_damping,
             nullspace_torque,
@@ -823,7 +829,7 @@ impl Arm {
     /// >>> bool(np.allclose(terms["stiffness"], np.where(arm.active_joints, pull, 0.0)))
     /// True
     #[pyo3(signature = (q, qd, reference, velocity = None, acceleration = None, *, stiffness, damping,
-        friction = None, active_joints = None, nullspace_damping = None, nullspace_torque = None,
+        friction = None, stribeck_velocity = None, active_joints = None, nullspace_damping = None, nullspace_torque = None,
         apparent_inertia = None, force = None))]
     #[expect(
         clippy::too_many_arguments,
@@ -840,6 +846,7 @@ impl Arm {
         stiffness: &Bound<'py, PyAny>,
         damping: &Bound<'py, PyAny>,
         friction: Option<&str>,
+        stribeck_velocity: Option<&Bound<'py, PyAny>>,
         active_joints: Option<Vec<bool>>,
         nullspace_damping: Option<&Bound<'py, PyAny>>,
         nullspace_torque: Option<&Bound<'py, PyAny>>,
@@ -855,6 +862,7 @@ impl Arm {
             stiffness,
             damping,
             friction,
+            stribeck_velocity,
             active_joints,
             nullspace_damping,
             nullspace_torque,

@@ -43,6 +43,7 @@ pub struct Given<'a, 'py> {
     pub stiffness: &'a Bound<'py, PyAny>,
     pub damping: &'a Bound<'py, PyAny>,
     pub friction: Option<&'a str>,
+    pub stribeck_velocity: Option<&'a Bound<'py, PyAny>>,
     pub active_joints: Option<Vec<bool>>,
     pub nullspace_damping: Option<&'a Bound<'py, PyAny>>,
     pub nullspace_torque: Option<&'a Bound<'py, PyAny>>,
@@ -55,6 +56,7 @@ pub struct LawBatch<'a> {
     directions: usize,
     active_joints: &'a [bool],
     friction: Option<(&'a [Friction], FrictionVelocity)>,
+    stribeck_velocity: Option<States<'a>>,
     q: States<'a>,
     qd: States<'a>,
     reference: States<'a>,
@@ -129,6 +131,12 @@ fn evaluate<'py>(
             )));
         }
     };
+    if given.stribeck_velocity.is_some() && friction_velocity != Some(FrictionVelocity::Reference) {
+        return Err(PyValueError::new_err(
+            "stribeck_velocity: only friction at the velocity of the reference has another velocity for the Stribeck \
+             effect; pass friction=\"reference\", or leave it out",
+        ));
+    }
     if given.apparent_inertia.is_some() != given.force.is_some() {
         return Err(PyValueError::new_err(
             "apparent_inertia: a chosen inertia needs the measured force of the tip; pass both \
@@ -156,6 +164,7 @@ fn evaluate<'py>(
     let optional = [
         ("velocity", given.velocity, axes),
         ("acceleration", given.acceleration, axes),
+        ("stribeck_velocity", given.stribeck_velocity, joints),
         ("nullspace_damping", nullspace_damping.as_ref(), joints),
         ("nullspace_torque", given.nullspace_torque, joints),
         ("apparent_inertia", given.apparent_inertia, square),
@@ -184,6 +193,7 @@ fn evaluate<'py>(
         directions,
         active_joints: &active_joints,
         friction: friction_velocity.map(|at| (description.friction(), at)),
+        stribeck_velocity: states_of("stribeck_velocity"),
         q: states[0],
         qd: states[1],
         reference: states[2],
@@ -458,10 +468,12 @@ fn each_state<T: TipTask<D>, const N: usize, const D: usize>(
             }
             None => None,
         };
+        let stribeck_velocity = batch.stribeck_velocity.map(|of| of.vector(k));
         let nullspace_torque_nm = batch.nullspace_torque.map(|torque| torque.vector(k));
         let law_input = LawInput {
             apparent,
             friction,
+            stribeck_velocity_rad_per_s: stribeck_velocity.as_ref(),
             nullspace_damping_nm_s_per_rad: batch.nullspace_damping.vector(k),
             nullspace_torque_nm: nullspace_torque_nm.as_ref(),
             ..LawInput::new(tip.target(), &qd)

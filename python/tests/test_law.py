@@ -228,6 +228,24 @@ def test_friction_is_fed_forward_at_the_velocity_of_the_reference():
     assert not arm.impedance_terms(**given)["friction"].any()
 
 
+def test_the_stribeck_effect_follows_another_velocity():
+    arm = supple.Arm.load("yam")
+    given = without_apparent_inertia(arguments(arm, 3))
+    at = {
+        speed: arm.impedance_terms(**given, friction="reference", stribeck_velocity=np.full(arm.dof, speed))["friction"]
+        for speed in (0.0, 100.0)
+    }
+    alone = arm.impedance_terms(**given, friction="reference")["friction"]
+    for joint in np.flatnonzero(given["active_joints"]):
+        friction = arm.friction[joint]
+        dip = friction.breakaway_nm - friction.coulomb_nm
+        assert dip > 0.0
+        step = at[0.0][:, joint] - at[100.0][:, joint] - friction.stribeck_offset_nm
+        assert np.abs(step).max() == pytest.approx(dip, rel=1e-3) and (step < 0.0).any() and (step > 0.0).any()
+        inside = (alone[:, joint] - at[0.0][:, joint]) * (alone[:, joint] - at[100.0][:, joint])
+        assert (inside <= 1e-12).all()
+
+
 def test_the_law_is_that_of_a_simulated_run(tmp_path):
     """The controller's own record: its state, reference and gains give its terms."""
     arm = supple.Arm.load("wam4")
@@ -258,6 +276,7 @@ TURNED = np.diag([1.0, 1.0, 1.1, 1.0])
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
+        ({"stribeck_velocity": np.zeros(4)}, "stribeck_velocity: only friction at the velocity of the reference"),
         ({"q": np.zeros(3)}, "q: expected shape (4,) or (..., 4), got (3,)"),
         ({"qd": np.zeros((3, 4))}, "qd: expected shape (2, 4), the batch of q, or (4,), got (3, 4)"),
         (

@@ -30,6 +30,8 @@ const LEAST_INFORMATION: f64 = 1e-4;
 const SPEED_BINS: usize = 15;
 /// Greatest weight of one of their samples, so that a few samples do not count for all.
 const MAX_SPEED_WEIGHT: f64 = 10.0;
+/// Part of the Stribeck effect that a direction must have shown in [`MIN_ROWS`] samples; less would be extrapolated by its inverse.
+const SEEN_SHARE: f64 = 0.5;
 
 /// Maximum number of reweighting iterations.
 const MAX_REWEIGHTINGS: usize = 5;
@@ -411,8 +413,20 @@ fn fit_stribeck(columns: &Columns, parts: &[Vec<JointRows>], x: &mut DVector<f64
             (true, false) => [0.0, alone(negative)],
             (true, true) => [0.0; 2],
         });
-        // One direction alone does not tell them apart.
-        let [positive_nm, negative_nm] = excess_nm.unwrap_or_else(|| [alone([1.0, 0.0]); 2]);
+        // What gears show is below the Coulomb friction.
+        let coulomb = columns.position(Column::Coulomb(joint));
+        let most_nm = coulomb.map_or(0.0, |c| x[c].max(0.0));
+        let is_seen = |sign: f64| {
+            let seen = shapes.iter().filter(|of| sign * of[0] >= SEEN_SHARE);
+            seen.count() >= MIN_ROWS
+        };
+        let seen = [is_seen(1.0), is_seen(-1.0)];
+        let [positive_nm, negative_nm] = match excess_nm {
+            Some(of) => [0, 1].map(|k| if seen[k] { of[k].min(most_nm) } else { 0.0 }),
+            // One direction alone does not tell them apart.
+            None if seen[0] || seen[1] => [alone([1.0, 0.0]).min(most_nm); 2],
+            None => [0.0; 2],
+        };
         x[stribeck] = 0.5 * (positive_nm + negative_nm);
         if let Some(offset) = offset {
             x[offset] = 0.5 * (positive_nm - negative_nm);

@@ -1,6 +1,7 @@
 //! The learner, which converts records of control cycles to requests with learned parameters.
 
 use crate::freeze::FreezeReason;
+use crate::gate::SlidingGate;
 use crate::information::Information;
 use crate::prior::Prior;
 use crate::prior::unknowns::VISCOUS;
@@ -8,39 +9,10 @@ use crate::report::Report;
 use crate::rows::{Row, Rows};
 use crate::solve::{Estimate, of_prior, solve};
 use std::collections::VecDeque;
+use supple_core::Config;
 use supple_core::controller::{CycleRecord, Request};
 use supple_core::learned::LearnedTerms;
 use supple_core::math::exp;
-use supple_core::{Config, Friction};
-
-/// Condition for the use of a joint's equations: near a reversal the dry friction is not identifiable.
-#[derive(Clone, Copy, Debug)]
-struct SpeedGate {
-    /// Minimum speed \[rad/s\].
-    min_rad_per_s: f64,
-    /// Time at such a speed, without a reversal, until the joint's filters have settled \[s\].
-    settle_s: f64,
-}
-
-impl SpeedGate {
-    const WITHOUT_PRESLIDING: SpeedGate = SpeedGate {
-        min_rad_per_s: 0.08,
-        settle_s: 0.15,
-    };
-    /// Condition with a known presliding distance, for which the equations model the reversal.
-    const WITH_PRESLIDING: SpeedGate = SpeedGate {
-        min_rad_per_s: 0.02,
-        settle_s: 0.05,
-    };
-
-    fn of(friction: &Friction) -> SpeedGate {
-        if friction.presliding_rad > 0.0 {
-            SpeedGate::WITH_PRESLIDING
-        } else {
-            SpeedGate::WITHOUT_PRESLIDING
-        }
-    }
-}
 
 /// Time over which equations are averaged to a sample \[s\]. The velocity is a difference quotient: its noise is large in single
 /// cycles and small in the mean.
@@ -87,12 +59,9 @@ pub struct Learner<const N: usize> {
     period_s: f64,
     rows: Rows<N>,
     last_cycle: Option<u64>,
-    /// Time since the last freeze, and for each joint time since it was last slow or reversed \[s\].
+    /// Time since the last freeze \[s\].
     since_freeze_s: f64,
-    since_slow_s: [f64; N],
-    /// Filtered velocity of the previous cycle \[rad/s\].
-    last_velocity_rad_per_s: [f64; N],
-    speed_gate: [SpeedGate; N],
+    gates: [SlidingGate; N],
     /// Sum of each joint's equations since the last sample, and their number; `None` if one of these equations must not be used.
     sums: Vec<Option<Row>>,
     summed: u32,
@@ -121,9 +90,7 @@ impl<const N: usize> Learner<N> {
             period_s: config.period_s,
             last_cycle: None,
             since_freeze_s: 0.0,
-            since_slow_s: [0.0; N],
-            last_velocity_rad_per_s: [0.0; N],
-            speed_gate: config.friction.map(|friction| SpeedGate::of(&friction)),
+            gates: config.friction.map(|friction| SlidingGate::new(&friction)),
             sums: vec![Some(Row::ZERO); N],
             summed: 0,
             cycles_per_sample: ((SAMPLE_S / config.period_s) as u32).max(1),
@@ -185,16 +152,9 @@ impl<const N: usize> Learner<N> {
         }
         let rows = self.rows.add_cycle(record);
         self.since_freeze_s += self.period_s;
-        for (i, since) in self.since_slow_s.iter_mut().enumerate() {
-            let velocity = rows[i].columns[VISCOUS];
-            let is_fast = velocity.abs() >= self.speed_gate[i].min_rad_per_s;
-            let reverses = velocity * self.last_velocity_rad_per_s[i] < 0.0;
-            self.last_velocity_rad_per_s[i] = velocity;
-            if is_fast && !reverses {
-                *since += self.period_s;
-            } else {
-                *since = 0.0;
-            }
+        for (i, gate) in self.gates.iter_mut().enumerate() {
+            let direction = self.rows.direction()[i];
+            gate.update(rows[i].columns[VISCOUS], direction, self.period_s);
         }
         match FreezeReason::of_cycle(record) {
             Some(frozen) => {
@@ -223,7 +183,7 @@ impl<const N: usize> Learner<N> {
     /// Adds a cycle to the samples of the joints that move. A sample is the mean equation of the cycles since the last sample.
     fn collect(&mut self, rows: &[Row]) {
         for (i, (sum, row)) in self.sums.iter_mut().zip(rows).enumerate() {
-            if self.since_slow_s[i] < self.speed_gate[i].settle_s {
+            if !self.gates[i].is_open() {
                 *sum = None;
             } else if let Some(sum) = sum {
                 sum.add(row);

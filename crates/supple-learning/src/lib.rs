@@ -19,6 +19,7 @@
 #![forbid(unsafe_code)]
 
 mod freeze;
+mod gate;
 mod information;
 mod learner;
 mod prior;

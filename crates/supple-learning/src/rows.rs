@@ -10,7 +10,8 @@
 //! the prediction error; the columns of the unknowns pass `F` too. Before `F`, command and angle pass the filter whose
 //! derivative is the velocity estimate, so that angle, velocity and torque belong to the same time; the command is
 //! delayed by the delay of the drives. Dry friction has the direction of [`Friction::direction_after`] if the presliding distance
-//! is known, otherwise the direction of the velocity.
+//! is known, with a play of one encoder step, otherwise the direction of the velocity. Where the feed-forward evaluates the Stribeck
+//! effect at the averaged velocity, so do the equations.
 //!
 //! [`Friction::direction_after`]: supple_core::Friction::direction_after
 
@@ -18,6 +19,7 @@ use crate::prior::unknowns::{
     ALL, COULOMB, MAP_DRY, MAP_TORQUE, MOMENT, OFFSET, PAYLOAD, SCALE, TILT, VISCOUS,
 };
 use std::collections::VecDeque;
+use supple_core::config::STRIBECK_AVERAGING_S;
 use supple_core::controller::CycleRecord;
 use supple_core::dynamics::{Terms, terms};
 use supple_core::learned::MapWeights;
@@ -74,6 +76,13 @@ pub struct Rows<const N: usize> {
     commands: VecDeque<Vector<N>>,
     /// Direction of each joint's dry friction, -1 to 1.
     direction: Vector<N>,
+    /// Angles that follow the measured ones with a play of one encoder step, so that noise at rest is no motion \[rad\].
+    slid_rad: Vector<N>,
+    /// Angles of the last cycle, and the smallest change of each, the step of its encoder \[rad\].
+    last_position: Vector<N>,
+    encoder_step: Vector<N>,
+    /// Velocity in the Stribeck effect, averaged as the controller does where that follows the measured velocity.
+    stribeck_velocity: Vector<N>,
     /// `F p`, and `F[G + D - C^T qd]`, `F[tau]`.
     momentum: Vector<N>,
     model: Vector<N>,
@@ -97,6 +106,10 @@ impl<const N: usize> Rows<N> {
             torque: [Vector::zeros(); 2],
             commands: VecDeque::new(),
             direction: Vector::zeros(),
+            slid_rad: Vector::zeros(),
+            last_position: Vector::zeros(),
+            encoder_step: Vector::repeat(f64::MAX),
+            stribeck_velocity: Vector::zeros(),
             momentum: Vector::zeros(),
             model: Vector::zeros(),
             command: Vector::zeros(),
@@ -104,6 +117,11 @@ impl<const N: usize> Rows<N> {
             columns: vec![[0.0; ALL]; N],
             config: *config,
         }
+    }
+
+    /// Returns the direction of each joint's dry friction, -1 to 1.
+    pub fn direction(&self) -> &Vector<N> {
+        &self.direction
     }
 
     /// Forgets all cycles; the filters settle again after some of their time constants.
@@ -120,6 +138,8 @@ impl<const N: usize> Rows<N> {
         if first {
             self.started = true;
             self.position = [record.position_rad; 2];
+            self.slid_rad = record.position_rad;
+            self.last_position = record.position_rad;
             self.torque = [command; 2];
             self.commands = vec![command; DRIVE_DELAY_CYCLES + 1].into();
         }
@@ -137,17 +157,37 @@ impl<const N: usize> Rows<N> {
         terms(&config.arm, &q, velocity, &mut self.terms);
         let loaded: [Friction; N] =
             core::array::from_fn(|i| config.friction[i].at_load(self.terms.gravity[i]));
-        let direction = Vector::<N>::from_fn(|i, _| {
+        for i in 0..N {
+            let change = (record.position_rad[i] - self.last_position[i]).abs();
+            if change > 0.0 {
+                self.encoder_step[i] = self.encoder_step[i].min(change);
+            }
             let friction = &config.friction[i];
             if friction.presliding_rad == 0.0 || first {
-                friction.direction(velocity[i])
-            } else {
-                friction.direction_after(self.direction[i], velocity[i] * config.period_s)
+                self.direction[i] = friction.direction(velocity[i]);
+                continue;
             }
-        });
-        self.direction = direction;
+            let play = self.encoder_step[i].min(friction.presliding_rad);
+            let away = q[i] - self.slid_rad[i];
+            let travel = away - away.clamp(-play, play);
+            if travel != 0.0 {
+                self.slid_rad[i] += travel;
+                self.direction[i] = friction.direction_after(self.direction[i], travel);
+            }
+        }
+        self.last_position = record.position_rad;
+        let direction = self.direction;
+        let averages = config.law.measured_stribeck && !first;
+        let share = match averages {
+            true => 1.0 - exp(-config.period_s / STRIBECK_AVERAGING_S),
+            false => 1.0,
+        };
+        self.stribeck_velocity += (velocity - self.stribeck_velocity) * share;
         let friction = Vector::<N>::from_fn(|i, _| {
-            loaded[i].torque_in_direction_nm(velocity[i], direction[i], 1.0)
+            let (friction, speed) = (&loaded[i], self.stribeck_velocity[i]);
+            friction.viscous_torque_nm(velocity[i])
+                + friction.offset_at_nm(speed)
+                + friction.dry_size_nm(speed) * direction[i]
         });
         let model = self.terms.gravity + friction - self.terms.kinetic_gradient;
         let tip_velocity = self.terms.jacobian.fixed_rows::<3>(0) * velocity;

@@ -500,6 +500,7 @@ class Arm:
         stiffness: ArrayLike,
         damping: ArrayLike,
         friction: Literal["reference", "measured"] | None = None,
+        stribeck_velocity: ArrayLike | None = None,
         active_joints: Sequence[bool] | None = None,
         nullspace_damping: ArrayLike | None = None,
         nullspace_torque: ArrayLike | None = None,
@@ -531,6 +532,10 @@ class Arm:
         friction : {"reference", "measured"}, optional
             Adds the feed-forward of :attr:`friction` at the joint velocities of the reference, as the controller does,
             or at ``qd``. Default: none.
+        stribeck_velocity : array_like, (..., N), optional
+            Joint velocities for the Stribeck effect of active joints (rad/s), with ``friction="reference"``: the controller
+            of an arm whose description has ``measured_stribeck`` (OpenArm, YAM) uses the measured ones, averaged over 50 ms.
+            Default: as the rest of the friction.
         active_joints : sequence of bool, (N,), optional
             Joints on which the law acts; at least ``d``. The others get ``G + C qd``, friction and the coupling torque.
             Default: :attr:`active_joints`.
@@ -581,6 +586,7 @@ class Arm:
         stiffness: ArrayLike,
         damping: ArrayLike,
         friction: Literal["reference", "measured"] | None = None,
+        stribeck_velocity: ArrayLike | None = None,
         active_joints: Sequence[bool] | None = None,
         nullspace_damping: ArrayLike | None = None,
         nullspace_torque: ArrayLike | None = None,

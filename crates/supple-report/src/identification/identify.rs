@@ -257,6 +257,24 @@ pub fn print(summary: &Summary, out: &Path) -> Result<(), Failure> {
             friction.breakaway_nm,
             friction.offset_nm
         ))?;
+        let by_direction = [
+            (
+                friction.viscous_asymmetry_nm_s_per_rad,
+                "viscous",
+                "N m s/rad",
+            ),
+            (
+                friction.stribeck_offset_nm,
+                "excess of the breakaway torque",
+                "N m",
+            ),
+        ];
+        for (half, of, unit) in by_direction.iter().filter(|(half, ..)| *half != 0.0) {
+            print_line(&format!(
+                "{}: half of the difference between the directions, {of}: {half:.3} {unit}",
+                friction.joint
+            ))?;
+        }
     }
     let delays: Vec<String> = summary
         .torque_delay_s
