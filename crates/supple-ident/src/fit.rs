@@ -31,7 +31,7 @@ const SPEED_BINS: usize = 15;
 /// Greatest weight of one of their samples, so that a few samples do not count for all.
 const MAX_SPEED_WEIGHT: f64 = 10.0;
 /// Part of the Stribeck effect that a direction must have shown in [`MIN_ROWS`] samples; less would be extrapolated by its inverse.
-const SEEN_SHARE: f64 = 0.5;
+const SEEN_SHARE: f64 = 0.3;
 
 /// Maximum number of reweighting iterations.
 const MAX_REWEIGHTINGS: usize = 5;

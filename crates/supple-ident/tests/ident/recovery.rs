@@ -243,6 +243,48 @@ fn breakaway_torque_that_differs_by_direction_is_found() {
     }
 }
 
+/// An error at speeds at which little of the Stribeck effect is left is not extrapolated to rest.
+#[test]
+fn a_stribeck_effect_that_the_motion_does_not_show_is_not_found() {
+    let truth = random_arm::<3>(31);
+    let friction = [Friction::coulomb(1.0, 1.0); 3];
+    let mut data = motion(&truth, &friction, &[0, 1, 2], 3000, 4);
+    for (tau, qd) in data.tau.iter_mut().zip(data.qd.iter()) {
+        if (0.03..0.06).contains(&qd.abs()) {
+            *tau += 0.1 * qd.signum();
+        }
+    }
+    for asymmetry in [false, true] {
+        // Outside a band of 1.25 times the Stribeck speed at most 21 % of the effect is left.
+        let options = Options {
+            friction: FrictionColumns {
+                stribeck_rad_per_s: Some(0.02),
+                band_rad_per_s: 0.025,
+                asymmetry,
+                ..FrictionColumns::COULOMB_AND_OFFSET
+            },
+            consistent_prior_weight: Some(1e-6),
+            slow_rad_per_s: 0.3,
+            ..Options::default()
+        };
+        let found = fit(&truth, &[data.clone()], &[0, 1, 2], &options).unwrap();
+        for friction in found.friction() {
+            assert_eq!(friction.breakaway_nm, friction.coulomb_nm);
+        }
+        let narrow = Options {
+            friction: FrictionColumns {
+                band_rad_per_s: 0.01,
+                ..options.friction
+            },
+            ..options
+        };
+        let found = fit(&truth, &[data.clone()], &[0, 1, 2], &narrow).unwrap();
+        for friction in found.friction() {
+            assert!(friction.breakaway_nm <= 2.0 * friction.coulomb_nm);
+        }
+    }
+}
+
 #[test]
 fn a_motor_coupled_to_two_joints_is_identified() {
     let truth = random_arm::<3>(41);
