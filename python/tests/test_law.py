@@ -228,8 +228,11 @@ def test_friction_is_fed_forward_at_the_velocity_of_the_reference():
     assert not arm.impedance_terms(**given)["friction"].any()
 
 
-def test_the_stribeck_effect_follows_another_velocity():
-    arm = supple.Arm.load("yam")
+def test_the_stribeck_effect_follows_another_velocity(tmp_path):
+    plain = supple.Arm.load("yam")
+    (tmp_path / "arm.toml").write_text(plain.toml.replace("coulomb_nm = ", "breakaway_nm = 0.5, coulomb_nm = "))
+    (tmp_path / "arm.urdf").write_text(plain.urdf)
+    arm = supple.Arm.load(tmp_path)
     given = without_apparent_inertia(arguments(arm, 3))
     at = {
         speed: arm.impedance_terms(**given, friction="reference", stribeck_velocity=np.full(arm.dof, speed))["friction"]
