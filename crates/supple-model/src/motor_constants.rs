@@ -35,7 +35,7 @@ impl MotorConstants {
     /// Writes the motors of an arm, from the base to the tip.
     ///
     /// # Errors
-    /// [`ModelError::File`].
+    /// [`ModelError::Write`].
     pub fn write(path: &Path, motors: Vec<MotorConstants>) -> Result<(), ModelError> {
         let text = toml::to_string(&File { motors }).map_err(|error| ModelError::Syntax {
             file: path.display().to_string(),
