@@ -242,7 +242,8 @@ def worker_threads():
 
 
 def test_an_interrupted_identification_stops_computing():
-    """What it computes until it ends, interrupted after a tenth, is less than the whole."""
+    """What it still computes after the interrupt is a small part of the whole. Other work of the process counts, too: the least of
+    three attempts decides."""
     motion = supple.design_excitation(ARM, candidates=5, period_s=10.0, periods=2)
     recording = supple.excite(ARM, motion)
 
@@ -263,11 +264,11 @@ def test_an_interrupted_identification_stops_computing():
             supple.identify(ARM, recording.t, recording.q, recording.tau)
 
     try:
-        part_s = cpu_s(broken_off)
+        part_s = min(cpu_s(broken_off) for _ in range(3))
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, signal.SIG_DFL)
-    assert part_s < 0.7 * whole_s, f"{part_s} of {whole_s} s"
+    assert part_s < 0.5 * whole_s, f"{part_s} of {whole_s} s"
 
 
 def test_representations_are_short():
