@@ -4,6 +4,7 @@
 //! others. The delay with the minimum held-out error, over all joints relative to their own torques, is refined by a parabola
 //! through its neighbours.
 
+use crate::cancellation::Cancellation;
 use crate::error::IdentError;
 use crate::log::Log;
 use crate::log_checks::resample_to_800;
@@ -34,15 +35,16 @@ pub struct DelayEstimate {
 /// Estimates the delay of `log`. Rate, filter and delay of `preparation` are replaced; the search is centred on zero.
 ///
 /// # Errors
-/// A log that is too short for its filter.
+/// A log that is too short for its filter; [`IdentError::Cancelled`].
 pub fn estimate_delay<const N: usize>(
     nominal: &Arm<N>,
     log: &Log,
     identified_joints: &[usize],
     couplings: &[(usize, usize)],
     preparation: &Preparation,
+    cancellation: &Cancellation,
 ) -> Result<DelayEstimate, IdentError> {
-    let context = FitContext::new(nominal, identified_joints, couplings)?;
+    let context = FitContext::new(nominal, identified_joints, couplings, cancellation)?;
     let mut known: Vec<(f64, f64)> = Vec::new();
     let mut score = |delay_s: f64| -> Result<f64, IdentError> {
         let same = |(d, _): &&(f64, f64)| (d - delay_s).abs() < 1e-9;

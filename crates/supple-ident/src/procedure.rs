@@ -195,12 +195,12 @@ impl Procedure {
             identified_joints,
             &self.couplings,
             preparation,
+            &self.cancellation,
         )?;
         let rejects = |f: &Finding| f.consequence == Consequence::Reject;
         if findings.iter().any(rejects) && !self.accept_wrong_logs {
             return Err(IdentError::WrongLog(findings));
         }
-        self.cancellation.check()?;
         let mut own = *preparation;
         if self.estimate_delay {
             let found = estimate_delay(
@@ -209,6 +209,7 @@ impl Procedure {
                 identified_joints,
                 &self.couplings,
                 preparation,
+                &self.cancellation,
             )?;
             own.torque_delay_s = found.delay_s;
         }

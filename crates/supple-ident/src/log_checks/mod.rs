@@ -23,6 +23,7 @@ pub(crate) mod weighted_fit;
 
 pub use finding::{Consequence, Finding, Problem};
 
+use crate::cancellation::Cancellation;
 use crate::error::IdentError;
 use crate::filter::LowPass;
 use crate::log::{Log, MAX_ANGLE_RAD};
@@ -41,13 +42,14 @@ const MAX_CUTOFF_HZ: f64 = 8.0;
 /// Checks `log` against `arm`, for the joints `identified_joints`. `couplings` and the torque's delay are those of the fit.
 ///
 /// # Errors
-/// Shapes that do not agree, values that are not finite, times that do not increase.
+/// Shapes that do not agree, values that are not finite, times that do not increase; [`IdentError::Cancelled`].
 pub fn check_log<const N: usize>(
     arm: &Arm<N>,
     log: &Log,
     identified_joints: &[usize],
     couplings: &[(usize, usize)],
     preparation: &Preparation,
+    cancellation: &Cancellation,
 ) -> Result<Vec<Finding>, IdentError> {
     log.check_table(N, identified_joints)?;
     let cutoff_hz = preparation.cutoff_hz.unwrap_or(MAX_CUTOFF_HZ);
@@ -77,7 +79,7 @@ pub fn check_log<const N: usize>(
         return Ok(findings);
     }
     let middle = resample_middle(log, preparation)?;
-    let context = weighted_fit::FitContext::new(arm, identified_joints, couplings)?;
+    let context = weighted_fit::FitContext::new(arm, identified_joints, couplings, cancellation)?;
     findings.extend(corrections::check(&context, &middle)?);
     findings.extend(many_revolutions(log, &findings));
     if !rejected(&findings) {

@@ -4,6 +4,7 @@
 //! (not negative), torque offsets, and the parameters of the links with a wide prior about the given arm. It takes milliseconds;
 //! the identified model comes from [`crate::procedure`].
 
+use crate::cancellation::Cancellation;
 use crate::columns::{Column, Columns, FrictionColumns};
 use crate::error::IdentError;
 use crate::model;
@@ -24,11 +25,12 @@ const ITERATIONS: usize = 4;
 /// Minimum relative residual of a joint; smaller values are rounding errors and are replaced by it.
 const MIN_RELATIVE_RESIDUAL: f64 = 2e-3;
 
-/// Arm, columns and prior.
+/// Arm, columns, prior, and the flag that ends the fits.
 pub(crate) struct FitContext<'a, const N: usize> {
     pub arm: &'a Arm<N>,
     pub columns: Columns,
     couplings: Vec<(usize, usize)>,
+    cancellation: &'a Cancellation,
     prior: DVector<f64>,
     /// One over the standard deviation of the prior.
     stiffness: DVector<f64>,
@@ -107,8 +109,9 @@ impl<'a, const N: usize> FitContext<'a, N> {
         arm: &'a Arm<N>,
         identified_joints: &[usize],
         couplings: &[(usize, usize)],
+        cancellation: &'a Cancellation,
     ) -> Result<Self, IdentError> {
-        Self::with_prior(arm, identified_joints, couplings, PRIOR)
+        Self::with_prior(arm, identified_joints, couplings, PRIOR, cancellation)
     }
 
     /// Does the same as [`FitContext::new`], with another relative deviation of the links' parameters.
@@ -117,6 +120,7 @@ impl<'a, const N: usize> FitContext<'a, N> {
         identified_joints: &[usize],
         couplings: &[(usize, usize)],
         prior_deviation: f64,
+        cancellation: &'a Cancellation,
     ) -> Result<Self, IdentError> {
         let columns = Columns::new(
             N,
@@ -150,6 +154,7 @@ impl<'a, const N: usize> FitContext<'a, N> {
             arm,
             columns,
             couplings: couplings.to_vec(),
+            cancellation,
             prior,
             stiffness,
         })
@@ -162,10 +167,13 @@ impl<'a, const N: usize> FitContext<'a, N> {
             self.columns.identified_joints(),
             &self.couplings,
             TIGHT_PRIOR,
+            self.cancellation,
         )
     }
 
+    /// Every fit begins with these matrices, so a cancellation takes effect here.
     pub fn grams(&self, motion: &Motion) -> Result<GramMatrices, IdentError> {
+        self.cancellation.check()?;
         let joints = joint_rows(self.arm, &self.columns, motion)?;
         let width = self.columns.len();
         let of_joint = joints.iter().map(|rows| {

@@ -6,7 +6,9 @@ use crate::{tx40, ur10e};
 use supple_core::dynamics::regressor;
 use supple_core::{Arm, Vector};
 use supple_ident::log_checks::{Finding, Problem, check_log};
-use supple_ident::{DMatrix, Log, Motion, Preparation, estimate_delay, resample};
+use supple_ident::{
+    Cancellation, DMatrix, IdentError, Log, Motion, Preparation, estimate_delay, resample,
+};
 use supple_random::Random;
 use variants::{Sizes, Variant, all};
 
@@ -52,7 +54,8 @@ fn findings<const N: usize>(
     preparation: &Preparation,
 ) -> Vec<Finding> {
     let moving: Vec<usize> = (0..N).collect();
-    match check_log(arm, log, &moving, couplings, preparation) {
+    let going_on = Cancellation::default();
+    match check_log(arm, log, &moving, couplings, preparation, &going_on) {
         Ok(findings) => findings,
         Err(error) => panic!("{error}"),
     }
@@ -267,9 +270,10 @@ fn a_delay_put_into_a_log_is_found() {
         ..Preparation::default()
     };
     let moving: Vec<usize> = (0..6).collect();
+    let going_on = Cancellation::default();
     let found = |lag_s: f64| {
         let log = lagging(&log, lag_s);
-        estimate_delay(&arm, &log, &moving, &[(4, 5)], &preparation).unwrap()
+        estimate_delay(&arm, &log, &moving, &[(4, 5)], &preparation, &going_on).unwrap()
     };
     let own = found(0.0);
     println!("{own:?}");
@@ -280,4 +284,19 @@ fn a_delay_put_into_a_log_is_found() {
         assert!(error_s.abs() < 2e-3, "{lag_s}: {with:?}");
         assert!(with.error_with < with.error_without);
     }
+}
+
+/// The checks of a log and the search of its delay are many fits each: the flag ends them at the next one.
+#[test]
+fn cancelled_checks_of_a_log_have_no_result() {
+    let arm = tx40::description().arm::<6>().expect("six joints");
+    let log = tx40::log();
+    let moving: Vec<usize> = (0..6).collect();
+    let cancelled = Cancellation::default();
+    cancelled.cancel();
+    let options = Preparation::default();
+    let findings = check_log(&arm, &log, &moving, &[(4, 5)], &options, &cancelled);
+    assert_eq!(findings.err(), Some(IdentError::Cancelled));
+    let delay = estimate_delay(&arm, &log, &moving, &[(4, 5)], &options, &cancelled);
+    assert_eq!(delay.err(), Some(IdentError::Cancelled));
 }
