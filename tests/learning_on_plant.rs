@@ -72,6 +72,7 @@ fn deviations_are_within_6_mm_after_24_s() {
         Deviation::Tilt(0.0, 0.5_f64.to_radians()),
     ] {
         let (rms_m, _) = track(&plan(deviation, sinusoid()));
+        println!("{deviation:?}: {:.2} mm", 1e3 * rms_m);
         assert!(rms_m <= 6e-3, "{deviation:?}: {:.2} mm", 1e3 * rms_m);
     }
 }

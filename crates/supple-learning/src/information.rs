@@ -1,6 +1,6 @@
 //! Normal equations of one joint: the information that its samples contain about the unknowns.
 
-use crate::prior::unknowns::ALL;
+use crate::prior::unknowns::{ALL, COULOMB, OFFSET};
 use crate::rows::Row;
 use nalgebra::{DMatrix, DVector};
 
@@ -31,6 +31,12 @@ impl Information {
     /// Returns whether there are no samples.
     pub fn is_empty(&self) -> bool {
         self.weight == 0.0
+    }
+
+    /// Returns the weight of the samples in the direction of motion that has less of it. The columns are the direction, -1 to 1,
+    /// and one.
+    pub fn weight_in_rarer_direction(&self) -> f64 {
+        0.5 * (self.gram[(COULOMB, COULOMB)] - self.gram[(COULOMB, OFFSET)].abs())
     }
 
     /// Adds an equation.

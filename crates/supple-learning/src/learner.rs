@@ -34,8 +34,11 @@ const DISTURBED: f64 = 4.0;
 const PERSISTENT_S: f64 = 20.0;
 /// Factor of the weight of older samples after such a change.
 const KEPT_AFTER_CHANGE: f64 = 0.02;
+/// Time of samples that a joint must have in each direction before they are used \[s\]. In one direction, dry friction is not told
+/// apart from an offset or a payload, and the errors of a short motion have one sign.
+const MIN_DIRECTION_S: f64 = 0.25;
 /// Time between estimates \[s\].
-const SOLVE_S: f64 = 2.0;
+const SOLVE_S: f64 = 1.0;
 /// Time from the last sample of an estimate until the controller applies the estimate, and its minimum in cycles. Queues between
 /// controller and learner are shorter, so that the cycle of application does not depend on the speed of either.
 const LATENCY_S: f64 = 2.0;
@@ -70,6 +73,8 @@ pub struct Learner<const N: usize> {
     collecting: Vec<Information>,
     waiting: VecDeque<Vec<Information>>,
     samples: Vec<Information>,
+    /// Whether the samples of each joint have had both directions of motion; those of other joints are not used yet.
+    both_directions: [bool; N],
     estimate: Option<Estimate>,
     since_solve_s: f64,
     has_new_samples: bool,
@@ -98,6 +103,7 @@ impl<const N: usize> Learner<N> {
             collecting: vec![Information::empty(); N],
             waiting: VecDeque::new(),
             samples: vec![Information::empty(); N],
+            both_directions: [false; N],
             since_solve_s: 0.0,
             has_new_samples: false,
             residual: [0.0; N],
@@ -111,6 +117,7 @@ impl<const N: usize> Learner<N> {
     /// Forgets all samples and resets the estimate to the prior.
     pub fn reset(&mut self) {
         self.samples = vec![Information::empty(); N];
+        self.both_directions = [false; N];
         self.estimate = of_prior(&self.prior);
         self.residual = [0.0; N];
         self.disturbed_s = 0.0;
@@ -125,13 +132,16 @@ impl<const N: usize> Learner<N> {
         Report {
             terms: of(Estimate::terms),
             deviations: of(Estimate::deviations),
-            learned_s: core::array::from_fn(|i| {
-                self.samples[i].weight * self.prior.noise_nm[i].powi(2) * CORRELATION_S
-            }),
+            learned_s: core::array::from_fn(|i| self.seconds(i, self.samples[i].weight)),
             residual_nm: self.residual.map(f64::sqrt),
             disturbances: self.disturbances,
             frozen: self.frozen,
         }
+    }
+
+    /// Returns the time of samples of a joint that have this weight \[s\].
+    fn seconds(&self, joint: usize, weight: f64) -> f64 {
+        weight * self.prior.noise_nm[joint].powi(2) * CORRELATION_S
     }
 
     /// Processes the record of a cycle; returns the requests of a new estimate, in most cycles none.
@@ -280,7 +290,7 @@ impl<const N: usize> Learner<N> {
         for samples in &mut self.samples {
             samples.forget(KEPT_AFTER_CHANGE);
         }
-        self.estimate = solve(&self.prior, &self.samples).or_else(|| of_prior(&self.prior));
+        self.estimate = self.solve().or_else(|| of_prior(&self.prior));
     }
 
     fn take(&mut self, interval: &[Information]) {
@@ -288,9 +298,11 @@ impl<const N: usize> Learner<N> {
             if new.is_empty() {
                 continue;
             }
-            let learned_s = new.weight * self.prior.noise_nm[i].powi(2) * CORRELATION_S;
+            let learned_s = self.seconds(i, new.weight);
             self.samples[i].forget(exp(-learned_s / FORGET_S));
             self.samples[i].merge(new);
+            let rarer_s = self.seconds(i, self.samples[i].weight_in_rarer_direction());
+            self.both_directions[i] |= rarer_s >= MIN_DIRECTION_S;
             if let Some(estimate) = &self.estimate {
                 let square = new.mean_square(&estimate.unknowns(i));
                 let known = new.mean_variance(&estimate.covariance[i]);
@@ -301,9 +313,24 @@ impl<const N: usize> Learner<N> {
         self.has_new_samples = true;
     }
 
+    /// Returns the estimate from the joints that have moved in both directions.
+    fn solve(&self) -> Option<Estimate> {
+        let used = |(samples, both): (&Information, bool)| match both {
+            true => samples.clone(),
+            false => Information::empty(),
+        };
+        let used: Vec<_> = self
+            .samples
+            .iter()
+            .zip(self.both_directions)
+            .map(used)
+            .collect();
+        solve(&self.prior, &used)
+    }
+
     /// Returns a new estimate as requests, all for a cycle later than the learner's maximum delay.
     fn requests(&mut self, cycle: u64) -> Vec<Scheduled<N>> {
-        let Some(estimate) = solve(&self.prior, &self.samples) else {
+        let Some(estimate) = self.solve() else {
             return Vec::new();
         };
         let terms = estimate.terms::<N>();
@@ -311,7 +338,7 @@ impl<const N: usize> Learner<N> {
         let latency = ((LATENCY_S / self.period_s) as u64).max(MIN_LATENCY_CYCLES);
         let at_cycle = cycle + latency;
         let parameters = Request::LearnedParameters(terms.parameters);
-        let maps = (0..N).filter(|i| !self.samples[*i].is_empty());
+        let maps = (0..N).filter(|i| self.both_directions[*i]);
         let maps = maps.map(|joint| Request::LearnedMap {
             joint,
             map: terms.map[joint],

@@ -4,13 +4,15 @@ use crate::support::configs::{four, seven, three};
 use crate::support::rig::bent;
 use crate::support::size;
 use crate::world::{Truth, World, exciting, model, size_of_joint};
+use core::f64::consts::PI;
 use proptest::prelude::*;
 use supple_core::controller::Request;
 use supple_core::dynamics::{gravity, rnea};
-use supple_core::learned::LearnedBounds;
+use supple_core::learned::{LearnedBounds, LearnedTerms};
 use supple_core::math::Vector3;
 use supple_core::trajectory::Fourier;
 use supple_core::{Arm, Config, Vector};
+use supple_learning::Scheduled;
 
 fn truth<const N: usize>() -> impl Strategy<Value = Truth<N>> {
     let joints = |reach: f64| {
@@ -243,6 +245,46 @@ fn same_records_give_the_same_requests() {
     let first = run();
     assert!(first.len() >= 4, "{} requests", first.len());
     assert_eq!(first, run());
+}
+
+/// All joints move in one direction for 10 s, then back.
+fn there_and_back() -> Fourier<4> {
+    let mut series = Fourier::at_rest(bent::<4>(), 0.1 * PI);
+    series.cosine_rad[0] = Vector::repeat(-0.5);
+    series.centre_rad -= series.at(0.0).position_rad - series.centre_rad;
+    series.duration_s = 40.0;
+    series
+}
+
+/// In one direction, dry friction is not told apart from an offset: the learner requests nothing before a joint has moved back.
+#[test]
+fn an_estimate_waits_for_both_directions() {
+    let config = model(four());
+    let truth = Truth {
+        coulomb: Vector::repeat(0.2),
+        ..Truth::none()
+    };
+    let mut world = World::new(config, truth);
+    world.request(Request::Excite(there_and_back()));
+    world.run(11.0, Vector3::zeros());
+    let learned_s = world.learner.report().learned_s;
+    assert!(learned_s.iter().all(|s| *s > 4.0), "{learned_s:?}");
+    let maps = |world: &World<4>| {
+        let is_map = |s: &&Scheduled<4>| matches!(s.request, Request::LearnedMap { .. });
+        world.requests.iter().filter(is_map).count()
+    };
+    assert_eq!(maps(&world), 0);
+    assert_eq!(world.learner.report().terms, LearnedTerms::zero());
+    world.run(26.0, Vector3::zeros());
+    assert!(maps(&world) >= 4, "{}", maps(&world));
+    let learned = world.learner.report().terms.parameters;
+    for (joint, friction) in config.friction.iter().enumerate() {
+        let (found_nm, expected_nm) = (learned.coulomb_nm[joint], 0.2 * friction.coulomb_nm);
+        assert!(
+            found_nm > 0.3 * expected_nm,
+            "joint {joint}: {found_nm} of {expected_nm} N m"
+        );
+    }
 }
 
 /// Joints that reverse again and again, slower than 0.08 rad/s.
