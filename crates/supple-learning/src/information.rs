@@ -33,8 +33,8 @@ impl Information {
         self.weight == 0.0
     }
 
-    /// Returns the weight of the samples in the direction of motion that has less of it. The columns are the direction, -1 to 1,
-    /// and one.
+    /// Returns the weight of the samples in the direction of motion that has less of it; less, if dry friction has not turned
+    /// completely in some samples. The columns are the direction, -1 to 1, and one.
     pub fn weight_in_rarer_direction(&self) -> f64 {
         0.5 * (self.gram[(COULOMB, COULOMB)] - self.gram[(COULOMB, OFFSET)].abs())
     }

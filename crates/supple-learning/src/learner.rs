@@ -55,6 +55,18 @@ pub struct Scheduled<const N: usize> {
     pub request: Request<N>,
 }
 
+/// Returns the number of cycles from the last sample of an estimate until the controller applies the estimate.
+fn latency_cycles(period_s: f64) -> u64 {
+    ((LATENCY_S / period_s) as u64).max(MIN_LATENCY_CYCLES)
+}
+
+/// Returns how many requests of a learner wait for their cycle at most, but for those that follow a reset: one for each joint and one
+/// more for each estimate.
+pub fn requests_in_flight(joints: usize, period_s: f64) -> usize {
+    let estimates = (latency_cycles(period_s) as f64 * period_s / SOLVE_S).ceil() as usize + 1;
+    estimates * (joints + 1)
+}
+
 /// Learns from the records of a controller.
 #[derive(Clone, Debug)]
 pub struct Learner<const N: usize> {
@@ -75,6 +87,8 @@ pub struct Learner<const N: usize> {
     samples: Vec<Information>,
     /// Whether the samples of each joint have had both directions of motion; those of other joints are not used yet.
     both_directions: [bool; N],
+    /// Joints whose map a request has changed.
+    requested: [bool; N],
     estimate: Option<Estimate>,
     since_solve_s: f64,
     has_new_samples: bool,
@@ -104,6 +118,7 @@ impl<const N: usize> Learner<N> {
             waiting: VecDeque::new(),
             samples: vec![Information::empty(); N],
             both_directions: [false; N],
+            requested: [false; N],
             since_solve_s: 0.0,
             has_new_samples: false,
             residual: [0.0; N],
@@ -132,7 +147,10 @@ impl<const N: usize> Learner<N> {
         Report {
             terms: of(Estimate::terms),
             deviations: of(Estimate::deviations),
-            learned_s: core::array::from_fn(|i| self.seconds(i, self.samples[i].weight)),
+            learned_s: core::array::from_fn(|i| match self.both_directions[i] {
+                true => self.seconds(i, self.samples[i].weight),
+                false => 0.0,
+            }),
             residual_nm: self.residual.map(f64::sqrt),
             disturbances: self.disturbances,
             frozen: self.frozen,
@@ -147,13 +165,16 @@ impl<const N: usize> Learner<N> {
     /// Processes the record of a cycle; returns the requests of a new estimate, in most cycles none.
     pub fn observe(&mut self, record: &CycleRecord<N>) -> Vec<Scheduled<N>> {
         use supple_core::codes::request_kind;
+        let cycle = record.input_cycle;
+        let mut requests = Vec::new();
         if record.request == request_kind::LEARNING
             && record.refusal == 0
             && record.request_values.values() == [2.0]
         {
             self.reset();
+            // Estimates from before are still on their way to the controller; the prior follows them.
+            requests = self.requests(cycle);
         }
-        let cycle = record.input_cycle;
         let follows = self.last_cycle.is_some_and(|last| cycle == last + 1);
         self.last_cycle = Some(cycle);
         if !follows {
@@ -170,9 +191,9 @@ impl<const N: usize> Learner<N> {
             Some(frozen) => {
                 self.frozen = Some(frozen);
                 self.freeze();
-                return Vec::new();
+                return requests;
             }
-            None if self.since_freeze_s < AFTER_FREEZE_S => return Vec::new(),
+            None if self.since_freeze_s < AFTER_FREEZE_S => return requests,
             None => {}
         }
         self.collect(&rows);
@@ -182,12 +203,12 @@ impl<const N: usize> Learner<N> {
             self.end_interval();
         }
         self.since_solve_s += self.period_s;
-        if self.since_solve_s < SOLVE_S || !self.has_new_samples {
-            return Vec::new();
+        if self.since_solve_s >= SOLVE_S && self.has_new_samples {
+            self.since_solve_s = 0.0;
+            self.has_new_samples = false;
+            requests.extend(self.requests(cycle));
         }
-        self.since_solve_s = 0.0;
-        self.has_new_samples = false;
-        self.requests(cycle)
+        requests
     }
 
     /// Adds a cycle to the samples of the joints that move. A sample is the mean equation of the cycles since the last sample.
@@ -328,17 +349,22 @@ impl<const N: usize> Learner<N> {
         solve(&self.prior, &used)
     }
 
-    /// Returns a new estimate as requests, all for a cycle later than the learner's maximum delay.
+    /// Returns a new estimate as requests, all for a cycle later than the learner's maximum delay; none before a joint counts.
     fn requests(&mut self, cycle: u64) -> Vec<Scheduled<N>> {
         let Some(estimate) = self.solve() else {
             return Vec::new();
         };
         let terms = estimate.terms::<N>();
         self.estimate = Some(estimate);
-        let latency = ((LATENCY_S / self.period_s) as u64).max(MIN_LATENCY_CYCLES);
-        let at_cycle = cycle + latency;
+        for (requested, counts) in self.requested.iter_mut().zip(self.both_directions) {
+            *requested |= counts;
+        }
+        if !self.requested.contains(&true) {
+            return Vec::new();
+        }
+        let at_cycle = cycle + latency_cycles(self.period_s);
         let parameters = Request::LearnedParameters(terms.parameters);
-        let maps = (0..N).filter(|i| self.both_directions[*i]);
+        let maps = (0..N).filter(|i| self.requested[*i]);
         let maps = maps.map(|joint| Request::LearnedMap {
             joint,
             map: terms.map[joint],

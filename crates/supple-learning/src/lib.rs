@@ -28,6 +28,6 @@ pub mod rows;
 pub mod solve;
 
 pub use freeze::FreezeReason;
-pub use learner::{Learner, Scheduled};
+pub use learner::{Learner, Scheduled, requests_in_flight};
 pub use prior::{Prior, unknowns};
 pub use report::Report;

@@ -17,8 +17,9 @@ const REQUESTS: usize = 16;
 /// Additional capacity that only idle requests may use.
 const IDLE_REQUESTS: usize = 8;
 const REPLIES: usize = 64;
-/// Capacity for the learner's requests: at most one per joint and one more for each estimate.
-const LEARNED: usize = 32;
+/// Capacity for the learner's requests, which wait for their cycles: enough for seven joints at 250 Hz, see
+/// [`supple_learning::requests_in_flight`].
+const LEARNED: usize = 128;
 /// Capacity for replies to idle requests; the loop sends at most one per cycle.
 const IDLE_REPLIES: usize = 64;
 
@@ -189,5 +190,22 @@ impl IdleThreadChannel {
     /// Whether the loop has ended.
     pub fn ended(&self) -> bool {
         self.replies.is_abandoned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::LEARNED;
+    use supple_learning::requests_in_flight;
+
+    /// At low rates more of the learner's estimates wait for their cycle.
+    #[test]
+    fn the_learners_requests_fit_at_every_rate() {
+        for rate_hz in [250.0, 400.0, 500.0, 1000.0] {
+            assert!(
+                requests_in_flight(7, 1.0 / rate_hz) <= LEARNED,
+                "{rate_hz} Hz"
+            );
+        }
     }
 }

@@ -12,7 +12,6 @@ use supple_core::learned::{LearnedBounds, LearnedTerms};
 use supple_core::math::Vector3;
 use supple_core::trajectory::Fourier;
 use supple_core::{Arm, Config, Vector};
-use supple_learning::Scheduled;
 
 fn truth<const N: usize>() -> impl Strategy<Value = Truth<N>> {
     let joints = |reach: f64| {
@@ -266,18 +265,20 @@ fn an_estimate_waits_for_both_directions() {
     };
     let mut world = World::new(config, truth);
     world.request(Request::Excite(there_and_back()));
-    world.run(11.0, Vector3::zeros());
-    let learned_s = world.learner.report().learned_s;
-    assert!(learned_s.iter().all(|s| *s > 4.0), "{learned_s:?}");
-    let maps = |world: &World<4>| {
-        let is_map = |s: &&Scheduled<4>| matches!(s.request, Request::LearnedMap { .. });
-        world.requests.iter().filter(is_map).count()
-    };
-    assert_eq!(maps(&world), 0);
-    assert_eq!(world.learner.report().terms, LearnedTerms::zero());
-    world.run(26.0, Vector3::zeros());
-    assert!(maps(&world) >= 4, "{}", maps(&world));
-    let learned = world.learner.report().terms.parameters;
+    world.run(9.0, Vector3::zeros());
+    let report = world.learner.report();
+    assert_eq!((report.learned_s, report.frozen), ([0.0; 4], None));
+    assert_eq!(report.terms, LearnedTerms::zero());
+    assert_eq!(world.requests, []);
+    world.run(28.0, Vector3::zeros());
+    let report = world.learner.report();
+    assert!(
+        report.learned_s.iter().all(|s| *s > 8.0),
+        "{:?}",
+        report.learned_s
+    );
+    assert!(world.requests.len() > 40, "{}", world.requests.len());
+    let learned = report.terms.parameters;
     for (joint, friction) in config.friction.iter().enumerate() {
         let (found_nm, expected_nm) = (learned.coulomb_nm[joint], 0.2 * friction.coulomb_nm);
         assert!(

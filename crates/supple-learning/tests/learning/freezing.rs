@@ -145,7 +145,7 @@ fn a_lasting_force_is_compensated_eventually() {
     );
 }
 
-/// A reset also discards the samples.
+/// A reset also discards the samples, and estimates that were on their way to the controller do not outlast it.
 #[test]
 fn reset_forgets() {
     let mut world = trained();
@@ -153,5 +153,13 @@ fn reset_forgets() {
     world.request(Request::Learning(LearningSwitch::Reset));
     let report = world.learner.report();
     assert_eq!(report.learned_s, [0.0; 4]);
-    assert_eq!(report.terms, world.rig.controller.config().learned);
+    let before = world.rig.controller.config().learned;
+    assert_eq!(report.terms, before);
+    let last = world
+        .requests
+        .last()
+        .expect("the prior follows the estimates");
+    assert!(last.at_cycle > world.rig.cycle);
+    world.request(Request::GravityHold);
+    assert_eq!(world.run(5.0, Vector3::zeros()).learned, before.parameters);
 }

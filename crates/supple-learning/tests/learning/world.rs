@@ -8,7 +8,7 @@ use supple_core::math::{Matrix3, Vector3};
 use supple_core::nalgebra::Rotation3;
 use supple_core::trajectory::Fourier;
 use supple_core::{Arm, Config, Friction, Output, Vector};
-use supple_learning::{Learner, Scheduled};
+use supple_learning::{Learner, Scheduled, requests_in_flight};
 
 /// The true arm's deviation from the model.
 #[derive(Clone, Copy, Debug)]
@@ -177,6 +177,8 @@ impl<const N: usize> World<N> {
         let news = self.learner.observe(&record);
         self.requests.extend(news.iter().copied());
         self.scheduled.extend(news);
+        let in_flight = requests_in_flight(N, self.rig.controller.config().period_s);
+        assert!(self.scheduled.len() <= in_flight + N + 1);
         let (friction, offset) = (self.friction, self.truth.offset_nm);
         let period_s = self.rig.controller.config().period_s;
         for (i, direction) in self.direction.iter_mut().enumerate() {
