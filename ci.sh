@@ -98,7 +98,7 @@ step_python() {
 step_package() {
     virtual_environment package python/requirements-test.txt
     local bin=$PWD/$WORK/package/bin
-    # As the tests of the programs are built, which takes a third of the time of a release.
+    # With the profile of the other tests.
     "$bin/pip" install --quiet --config-settings=build-args="--profile dev" ./python
     # The tests of a system in real time fail on a busy machine: they run when asked for.
     if [[ ${SUPPLE_LIVE:-} == 1 ]]; then
