@@ -11,8 +11,9 @@ use supple_realtime::{Stop, pause};
 const ANSWER_POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Poll interval for a controller to join, and time for an answer once the controller is lost.
 const JOIN_POLL_INTERVAL: Duration = Duration::from_millis(1);
-/// Number of polls without an answer after which the controller counts as lost in virtual time (2 s).
-const MAX_UNANSWERED_POLLS: u32 = 40;
+/// Number of polls without an answer after which a controller whose process exists counts as lost in virtual time (a minute): it
+/// may wait for a reader of its telemetry that the machine keeps from running.
+const MAX_UNANSWERED_POLLS: u32 = 1200;
 
 /// The plant's link to the controller through shared memory.
 pub struct SharedMemoryLink {
@@ -27,7 +28,8 @@ pub struct SharedMemoryLink {
 
 impl SharedMemoryLink {
     /// Creates the link. In real time it waits for an answer as long as the cycle allows. In virtual time, which does not
-    /// advance during the wait, it waits until the answer arrives or the controller counts as lost after 2 s.
+    /// advance during the wait, it waits until the answer arrives; the controller counts as lost once its process has ended, at the latest
+    /// after a minute.
     pub fn new(link: PlantLink, virtual_time: bool, stop: Stop) -> SharedMemoryLink {
         SharedMemoryLink {
             link,
@@ -120,6 +122,7 @@ impl<const N: usize> Link<N> for SharedMemoryLink {
             (true, true) => JOIN_POLL_INTERVAL,
             (true, false) => ANSWER_POLL_INTERVAL,
         };
+        let mut ended = false;
         for _ in 0..polls {
             let received = self.link.answer(cycle, wait)?;
             late += received.late;
@@ -130,9 +133,11 @@ impl<const N: usize> Link<N> for SharedMemoryLink {
                     late,
                 });
             }
-            if self.stop.shutdown_requested() {
+            if ended || self.stop.shutdown_requested() {
                 break;
             }
+            // An answer that it sent before its end is read once more.
+            ended = self.virtual_time && !self.link.has_controller()?;
         }
         self.lost = self.virtual_time;
         Ok(Answer {

@@ -10,7 +10,7 @@
 
 use crate::cleanup::SharedMemoryCleanup;
 use crate::domain::Domain;
-use crate::error::IpcError;
+use crate::error::{IpcError, failed};
 use crate::message::{ArmState, TorqueCommand, WakeRequest};
 use crate::port::{Backpressure, QualityOfService, Reader, Writer};
 use crate::wake::{WaitResult, WakeReason, WakeReceiver, WakeSender};
@@ -131,6 +131,16 @@ impl PlantLink {
     /// Number of commands discarded because this system's controller did not write them.
     pub fn foreign(&self) -> u64 {
         self.controller.dropped()
+    }
+
+    /// Returns whether a controller's process exists; it may be stopped or blocked. A controller that joins at this moment may wait a
+    /// millisecond longer. Opens no file and allocates no memory.
+    ///
+    /// # Errors
+    /// [`IpcError::Service`].
+    pub fn has_controller(&self) -> Result<bool, IpcError> {
+        let has = self.controller.has_writer();
+        has.map_err(|error| failed(COMMANDS.name, &error))
     }
 
     /// Notifies the controller that a state follows within some tens or hundreds of microseconds, so that the controller can do
