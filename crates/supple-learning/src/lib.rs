@@ -26,6 +26,7 @@ mod prior;
 mod report;
 pub mod rows;
 pub mod solve;
+mod travel;
 
 pub use freeze::FreezeReason;
 pub use learner::{Learner, Scheduled, requests_in_flight};

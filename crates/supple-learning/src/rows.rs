@@ -10,16 +10,15 @@
 //! the prediction error; the columns of the unknowns pass `F` too. Before `F`, command and angle pass the filter whose
 //! derivative is the velocity estimate, so that angle, velocity and torque belong to the same time; the command is
 //! delayed by the delay of the drives. Dry friction has the direction of [`Friction::direction_after`] if the presliding distance
-//! is known, with a play of one encoder step, otherwise the direction of the velocity. Where the feed-forward evaluates the Stribeck
-//! effect at the averaged velocity, so do the equations.
+//! is known, along the travel that the encoder resolves, otherwise the direction of the velocity.
 //!
 //! [`Friction::direction_after`]: supple_core::Friction::direction_after
 
 use crate::prior::unknowns::{
     ALL, COULOMB, MAP_DRY, MAP_TORQUE, MOMENT, OFFSET, PAYLOAD, SCALE, TILT, VISCOUS,
 };
+use crate::travel::Travel;
 use std::collections::VecDeque;
-use supple_core::config::STRIBECK_AVERAGING_S;
 use supple_core::controller::CycleRecord;
 use supple_core::dynamics::{Terms, terms};
 use supple_core::learned::MapWeights;
@@ -76,13 +75,7 @@ pub struct Rows<const N: usize> {
     commands: VecDeque<Vector<N>>,
     /// Direction of each joint's dry friction, -1 to 1.
     direction: Vector<N>,
-    /// Angles that follow the measured ones with a play of one encoder step, so that noise at rest is no motion \[rad\].
-    slid_rad: Vector<N>,
-    /// Angles of the last cycle, and the smallest change of each, the step of its encoder \[rad\].
-    last_position: Vector<N>,
-    encoder_step: Vector<N>,
-    /// Velocity in the Stribeck effect, averaged as the controller does where that follows the measured velocity.
-    stribeck_velocity: Vector<N>,
+    travel: [Travel; N],
     /// `F p`, and `F[G + D - C^T qd]`, `F[tau]`.
     momentum: Vector<N>,
     model: Vector<N>,
@@ -106,10 +99,7 @@ impl<const N: usize> Rows<N> {
             torque: [Vector::zeros(); 2],
             commands: VecDeque::new(),
             direction: Vector::zeros(),
-            slid_rad: Vector::zeros(),
-            last_position: Vector::zeros(),
-            encoder_step: Vector::repeat(f64::MAX),
-            stribeck_velocity: Vector::zeros(),
+            travel: [Travel::new(); N],
             momentum: Vector::zeros(),
             model: Vector::zeros(),
             command: Vector::zeros(),
@@ -138,8 +128,9 @@ impl<const N: usize> Rows<N> {
         if first {
             self.started = true;
             self.position = [record.position_rad; 2];
-            self.slid_rad = record.position_rad;
-            self.last_position = record.position_rad;
+            for (travel, angle_rad) in self.travel.iter_mut().zip(&record.position_rad) {
+                travel.begin_at(*angle_rad);
+            }
             self.torque = [command; 2];
             self.commands = vec![command; DRIVE_DELAY_CYCLES + 1].into();
         }
@@ -158,36 +149,23 @@ impl<const N: usize> Rows<N> {
         let loaded: [Friction; N] =
             core::array::from_fn(|i| config.friction[i].at_load(self.terms.gravity[i]));
         for i in 0..N {
-            let change = (record.position_rad[i] - self.last_position[i]).abs();
-            if change > 0.0 {
-                self.encoder_step[i] = self.encoder_step[i].min(change);
-            }
             let friction = &config.friction[i];
             if friction.presliding_rad == 0.0 || first {
                 self.direction[i] = friction.direction(velocity[i]);
                 continue;
             }
-            let play = self.encoder_step[i].min(friction.presliding_rad);
-            let away = q[i] - self.slid_rad[i];
-            let travel = away - away.clamp(-play, play);
-            if travel != 0.0 {
-                self.slid_rad[i] += travel;
-                self.direction[i] = friction.direction_after(self.direction[i], travel);
+            let measured_rad = record.position_rad[i];
+            let travel_rad = self.travel[i].to(measured_rad, q[i], friction.presliding_rad);
+            if travel_rad != 0.0 {
+                self.direction[i] = friction.direction_after(self.direction[i], travel_rad);
             }
         }
-        self.last_position = record.position_rad;
         let direction = self.direction;
-        let averages = config.law.measured_stribeck && !first;
-        let share = match averages {
-            true => 1.0 - exp(-config.period_s / STRIBECK_AVERAGING_S),
-            false => 1.0,
-        };
-        self.stribeck_velocity += (velocity - self.stribeck_velocity) * share;
         let friction = Vector::<N>::from_fn(|i, _| {
-            let (friction, speed) = (&loaded[i], self.stribeck_velocity[i]);
-            friction.viscous_torque_nm(velocity[i])
-                + friction.offset_at_nm(speed)
-                + friction.dry_size_nm(speed) * direction[i]
+            let (friction, velocity) = (&loaded[i], velocity[i]);
+            friction.viscous_torque_nm(velocity)
+                + friction.offset_at_nm(velocity)
+                + friction.dry_size_nm(velocity) * direction[i]
         });
         let model = self.terms.gravity + friction - self.terms.kinetic_gradient;
         let tip_velocity = self.terms.jacobian.fixed_rows::<3>(0) * velocity;
