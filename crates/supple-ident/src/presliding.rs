@@ -15,8 +15,8 @@ use nalgebra::DVector;
 use supple_core::Friction;
 
 /// Candidate travels \[rad\].
-const TRAVELS_RAD: [f64; 10] = [
-    1.5e-4, 2.5e-4, 3.5e-4, 5e-4, 7e-4, 1e-3, 1.4e-3, 2e-3, 4e-3, 8e-3,
+const TRAVELS_RAD: [f64; 12] = [
+    1.5e-4, 2.5e-4, 3.5e-4, 5e-4, 7e-4, 1e-3, 1.4e-3, 2e-3, 2.8e-3, 4e-3, 5.6e-3, 8e-3,
 ];
 /// Travel before and after a reversal that is evaluated \[rad\].
 const WINDOW_RAD: f64 = 0.01;
