@@ -20,8 +20,15 @@ pub mod unknowns {
     pub const MAP_TORQUE: usize = 4;
     /// First coefficient of the map's part against the motion.
     pub const MAP_DRY: usize = MAP_TORQUE + MAP_KNOTS;
+    /// Relative error of the presliding distance. Like the two unknowns after it, it is estimated so that equations of low speeds do not
+    /// change the others, and not requested.
+    pub const PRESLIDING: usize = MAP_DRY + MAP_KNOTS;
+    /// Change of the breakaway torque, mean of both directions.
+    pub const BREAKAWAY: usize = PRESLIDING + 1;
+    /// Half of the difference of this change between the directions.
+    pub const BREAKAWAY_OFFSET: usize = BREAKAWAY + 1;
     /// Unknowns of a joint.
-    pub const JOINT: usize = MAP_DRY + MAP_KNOTS;
+    pub const JOINT: usize = BREAKAWAY_OFFSET + 1;
     /// Payload mass, the first of the shared unknowns.
     pub const PAYLOAD: usize = JOINT;
     /// First moment of the payload, three.
@@ -33,8 +40,10 @@ pub mod unknowns {
     /// All unknowns in the equations of one joint.
     pub const ALL: usize = JOINT + SHARED;
 }
-use unknowns::{ALL, COULOMB, JOINT, MAP_DRY, MAP_TORQUE, MOMENT, OFFSET, PAYLOAD, SCALE, SHARED};
-use unknowns::{TILT, VISCOUS};
+use unknowns::{
+    ALL, BREAKAWAY, BREAKAWAY_OFFSET, COULOMB, JOINT, MAP_DRY, MAP_TORQUE, MOMENT, OFFSET, PAYLOAD,
+    PRESLIDING, SCALE, SHARED, TILT, VISCOUS,
+};
 
 /// Standard deviation of the prior relative to the bound, for payload, tilt and friction.
 const PRIOR_SHARE: f64 = 0.4;
@@ -48,6 +57,12 @@ const MAP_TORQUE_SHARE: f64 = 0.05;
 const MAP_DRY_SHARE: f64 = 0.2;
 /// Standard deviation of the map's second differences relative to that of its coefficients, which determines its smoothness.
 const SMOOTHNESS: f64 = 0.5;
+/// Standard deviation of the relative error of the presliding distance, and its bound.
+const PRESLIDING_STD: f64 = 0.3;
+const PRESLIDING_BOUND: f64 = 1.0;
+/// Standard deviation of the change of the breakaway torque in proportion to the Coulomb friction, and its bound.
+const BREAKAWAY_SHARE: f64 = 0.1;
+const BREAKAWAY_BOUND: f64 = 0.5;
 /// Minimum standard deviation, so that no precision is infinite.
 const MIN_STD: f64 = 1e-9;
 /// Share of the dry friction, and of the torque limit, in the noise of a joint's torque.
@@ -89,14 +104,16 @@ impl<const N: usize> Prior<N> {
         Prior {
             joint_precision: (0..N)
                 .map(|i| {
-                    let bound = joint_of(&box_of, i);
-                    joint_precision(&bound, config.friction[i].coulomb_nm)
+                    joint_precision(
+                        &joint_bound(&box_of, config, i),
+                        config.friction[i].coulomb_nm,
+                    )
                 })
                 .collect(),
             shared_precision: shared_bound.map(|bound| precision(PRIOR_SHARE * bound)),
             joint_mean: (0..N).map(|i| joint_of(&config.learned, i)).collect(),
             shared_mean: shared_of(&config.learned.parameters),
-            joint_bound: (0..N).map(|i| joint_of(&box_of, i)).collect(),
+            joint_bound: (0..N).map(|i| joint_bound(&box_of, config, i)).collect(),
             shared_bound,
             noise_nm: core::array::from_fn(|i| {
                 NOISE_FRICTION_SHARE * config.friction[i].breakaway_nm
@@ -120,6 +137,13 @@ fn joint_precision(bound: &DVector<f64>, coulomb_nm: f64) -> DMatrix<f64> {
     ] {
         matrix[(index, index)] = precision(share * bound[index]);
     }
+    for (index, deviation) in [
+        (PRESLIDING, PRESLIDING_STD),
+        (BREAKAWAY, BREAKAWAY_SHARE * coulomb_nm),
+        (BREAKAWAY_OFFSET, BREAKAWAY_SHARE * coulomb_nm),
+    ] {
+        matrix[(index, index)] = precision(deviation);
+    }
     for (first, deviation) in [
         (MAP_TORQUE, MAP_TORQUE_SHARE * bound[MAP_TORQUE]),
         (MAP_DRY, MAP_DRY_SHARE * coulomb_nm),
@@ -139,7 +163,21 @@ fn joint_precision(bound: &DVector<f64>, coulomb_nm: f64) -> DMatrix<f64> {
     matrix
 }
 
-/// Returns a joint's own unknowns.
+/// Returns the bounds of a joint's own unknowns.
+fn joint_bound<const N: usize>(
+    box_of: &LearnedTerms<N>,
+    config: &Config<N>,
+    joint: usize,
+) -> DVector<f64> {
+    let mut bound = joint_of(box_of, joint);
+    let breakaway_nm = BREAKAWAY_BOUND * config.friction[joint].coulomb_nm;
+    bound[PRESLIDING] = PRESLIDING_BOUND;
+    bound[BREAKAWAY] = breakaway_nm;
+    bound[BREAKAWAY_OFFSET] = breakaway_nm;
+    bound
+}
+
+/// Returns a joint's own unknowns; those that are not requested are zero.
 pub(crate) fn joint_of<const N: usize>(terms: &LearnedTerms<N>, joint: usize) -> DVector<f64> {
     let parameters = &terms.parameters;
     let first = [
@@ -149,7 +187,8 @@ pub(crate) fn joint_of<const N: usize>(terms: &LearnedTerms<N>, joint: usize) ->
         parameters.torque_scale[joint],
     ];
     let all = first.iter().chain(terms.map[joint].coefficients()).copied();
-    DVector::from_iterator(JOINT, all)
+    let not_requested = core::iter::repeat_n(0.0, JOINT - PRESLIDING);
+    DVector::from_iterator(JOINT, all.chain(not_requested))
 }
 
 /// Returns the shared unknowns.

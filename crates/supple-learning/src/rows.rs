@@ -15,7 +15,8 @@
 //! [`Friction::direction_after`]: supple_core::Friction::direction_after
 
 use crate::prior::unknowns::{
-    ALL, COULOMB, MAP_DRY, MAP_TORQUE, MOMENT, OFFSET, PAYLOAD, SCALE, TILT, VISCOUS,
+    ALL, BREAKAWAY, BREAKAWAY_OFFSET, COULOMB, MAP_DRY, MAP_TORQUE, MOMENT, OFFSET, PAYLOAD,
+    PRESLIDING, SCALE, TILT, VISCOUS,
 };
 use crate::travel::Travel;
 use std::collections::VecDeque;
@@ -23,7 +24,7 @@ use supple_core::controller::CycleRecord;
 use supple_core::dynamics::{Terms, terms};
 use supple_core::learned::MapWeights;
 use supple_core::learned_torque::{payload_torque_nm, tilt_torque_nm};
-use supple_core::math::{Vector3, exp};
+use supple_core::math::{Vector3, exp, log};
 use supple_core::{Config, Friction, Vector};
 
 /// Bandwidth of the filter `F` \[rad/s\].
@@ -185,7 +186,7 @@ impl<const N: usize> Rows<N> {
         let needed = (self.terms.momentum - self.momentum) * rate + self.model;
         let acceleration = (tip_velocity - self.tip_velocity) * rate;
 
-        let raw = self.columns_now(&q, velocity);
+        let raw = self.columns_now(&q, velocity, &loaded);
         let payload_inertia = payload_columns(&self.terms, &acceleration);
         let mut rows = Vec::with_capacity(N);
         for (i, raw) in raw.iter().enumerate() {
@@ -211,7 +212,12 @@ impl<const N: usize> Rows<N> {
     }
 
     /// Returns the columns before the filter, without the inertia of the payload and without the torque scale.
-    fn columns_now(&self, q: &Vector<N>, velocity: &Vector<N>) -> Vec<[f64; ALL]> {
+    fn columns_now(
+        &self,
+        q: &Vector<N>,
+        velocity: &Vector<N>,
+        friction: &[Friction; N],
+    ) -> Vec<[f64; ALL]> {
         let config = &self.config;
         let gravity = config.arm.gravity();
         let weight = payload_columns(&self.terms, &-gravity);
@@ -230,6 +236,15 @@ impl<const N: usize> Rows<N> {
                 columns[VISCOUS] = velocity[i];
                 columns[COULOMB] = direction;
                 columns[OFFSET] = 1.0;
+                let friction = &friction[i];
+                if friction.presliding_rad > 0.0 {
+                    let size_nm = friction.dry_size_nm(velocity[i]);
+                    columns[PRESLIDING] =
+                        size_nm * direction_by_presliding(direction, self.travel[i].sign());
+                }
+                let s = velocity[i] / friction.stribeck_rad_per_s;
+                columns[BREAKAWAY] = exp(-s * s) * direction;
+                columns[BREAKAWAY_OFFSET] = exp(-s * s);
                 for (k, weight) in map.weights.iter().enumerate() {
                     columns[MAP_TORQUE + map.first + k] = *weight;
                     columns[MAP_DRY + map.first + k] = weight * direction;
@@ -246,6 +261,13 @@ impl<const N: usize> Rows<N> {
     }
 }
 
+/// Returns the derivative of the direction of dry friction with respect to the logarithm of the presliding distance, after travel
+/// with this sign that began with the friction fully reversed.
+fn direction_by_presliding(direction: f64, sign: f64) -> f64 {
+    let left = (1.0 - direction * sign).clamp(f64::MIN_POSITIVE, 2.0);
+    -sign * left * log(2.0 / left)
+}
+
 /// Returns the torques of a unit mass, and of each unit of its first moment.
 fn payload_columns<const N: usize>(
     terms: &Terms<N>,
@@ -260,4 +282,31 @@ fn payload_columns<const N: usize>(
         let mass = if k == 0 { 1.0 } else { 0.0 };
         payload_torque_nm(terms, force_n_per_kg, mass, &moment)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::direction_by_presliding;
+    use supple_core::Friction;
+
+    /// The derivative is that of the law itself, by differences.
+    #[test]
+    fn the_derivative_by_the_presliding_distance_is_that_of_the_friction() {
+        let direction = |presliding_rad: f64, travel_rad: f64| {
+            let friction = Friction {
+                presliding_rad,
+                ..Friction::coulomb(0.1, 0.5)
+            };
+            friction.direction_after(-travel_rad.signum(), travel_rad)
+        };
+        for travel_rad in [1e-4, 1e-3, 5e-3, -1e-3, -5e-3] {
+            let (d, h) = (2e-3_f64, 1e-4);
+            let difference =
+                direction(d * (1.0 + h), travel_rad) - direction(d * (1.0 - h), travel_rad);
+            let expected = difference / (2.0 * h);
+            let found = direction_by_presliding(direction(d, travel_rad), travel_rad.signum());
+            assert!((found - expected).abs() < 1e-6, "{found}, {expected}");
+        }
+        assert!(direction_by_presliding(1.0, 1.0).abs() < 1e-12);
+    }
 }

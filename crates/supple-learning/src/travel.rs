@@ -31,6 +31,11 @@ impl Travel {
         self.sign = 0.0;
     }
 
+    /// Returns the sign of the last travel, 0 before any.
+    pub(crate) fn sign(&self) -> f64 {
+        self.sign
+    }
+
     /// Returns the travel since the last call that had any \[rad\], 0 if it may be noise. `angle_rad` is the filtered angle; a change
     /// against the last direction of motion that is greater than `at_most_rad` is no noise, however coarse the encoder is.
     pub(crate) fn to(&mut self, measured_rad: f64, angle_rad: f64, at_most_rad: f64) -> f64 {
