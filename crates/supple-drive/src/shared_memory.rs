@@ -7,7 +7,7 @@ use supple_ipc::message::{self, ArmState, PlantReport, TorqueCommand};
 use supple_ipc::{IpcError, PlantLink};
 use supple_realtime::{Stop, pause};
 
-/// Interval in virtual time at which the link checks for an answer and for a shutdown request.
+/// Interval in virtual time at which the link checks for an answer, for a shutdown request and whether there is a controller.
 const ANSWER_POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Poll interval for a controller to join, and time for an answer once the controller is lost.
 const JOIN_POLL_INTERVAL: Duration = Duration::from_millis(1);

@@ -133,8 +133,9 @@ impl PlantLink {
         self.controller.dropped()
     }
 
-    /// Returns whether a controller's process exists; it may be stopped or blocked. A controller that joins at this moment may wait a
-    /// millisecond longer. Opens no file and allocates no memory.
+    /// Returns whether a controller has joined and has not left; its process may be stopped or blocked. A controller that joins at this
+    /// moment may wait a millisecond longer; if this process is stopped at this moment for longer than 0.2 s, it is refused. Opens no
+    /// file and allocates no memory.
     ///
     /// # Errors
     /// [`IpcError::Service`].
@@ -426,6 +427,20 @@ mod tests {
             let received = plant.answer(cycle, TIMEOUT).expect("read");
             assert_eq!(received.answer, Some(command));
         }
+    }
+
+    #[test]
+    fn a_controller_is_there_from_joining_to_leaving() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let domain = Domain::in_folder(&folder.path().join("run"), "there").expect("a domain");
+        let plant = PlantLink::new(&domain).expect("a plant");
+        for _ in 0..2 {
+            assert!(!plant.has_controller().expect("read"));
+            let controller = ControllerLink::new(&domain).expect("a controller");
+            assert!(plant.has_controller().expect("read"));
+            drop(controller);
+        }
+        assert!(!plant.has_controller().expect("read"));
     }
 
     #[test]

@@ -35,7 +35,7 @@ pub(crate) struct SlidingGate {
 }
 
 impl SlidingGate {
-    /// Creates the gate of a joint with this friction. With its presliding distance known, a joint counts from a quarter of the speed on.
+    /// Creates the gate of a joint with this friction.
     pub(crate) fn new(friction: &Friction) -> Self {
         let presliding = friction.presliding_rad > 0.0;
         let (min_rad_per_s, settle_s) = if presliding {

@@ -20,15 +20,15 @@ pub mod unknowns {
     pub const MAP_TORQUE: usize = 4;
     /// First coefficient of the map's part against the motion.
     pub const MAP_DRY: usize = MAP_TORQUE + MAP_KNOTS;
-    /// Relative error of the presliding distance. Like the two unknowns after it, it is estimated so that equations of low speeds do not
-    /// change the others, and not requested.
+    /// Change of the logarithm of the presliding distance. Like the two unknowns after it, it is estimated so that equations of low speeds
+    /// do not change the others, and not requested.
     pub const PRESLIDING: usize = MAP_DRY + MAP_KNOTS;
-    /// Change of the breakaway torque, mean of both directions.
-    pub const BREAKAWAY: usize = PRESLIDING + 1;
-    /// Half of the difference of this change between the directions.
-    pub const BREAKAWAY_OFFSET: usize = BREAKAWAY + 1;
+    /// Change of the Stribeck effect `S_0 - S`.
+    pub const STRIBECK: usize = PRESLIDING + 1;
+    /// Change of its offset `O_s`.
+    pub const STRIBECK_OFFSET: usize = STRIBECK + 1;
     /// Unknowns of a joint.
-    pub const JOINT: usize = BREAKAWAY_OFFSET + 1;
+    pub const JOINT: usize = STRIBECK_OFFSET + 1;
     /// Payload mass, the first of the shared unknowns.
     pub const PAYLOAD: usize = JOINT;
     /// First moment of the payload, three.
@@ -41,8 +41,8 @@ pub mod unknowns {
     pub const ALL: usize = JOINT + SHARED;
 }
 use unknowns::{
-    ALL, BREAKAWAY, BREAKAWAY_OFFSET, COULOMB, JOINT, MAP_DRY, MAP_TORQUE, MOMENT, OFFSET, PAYLOAD,
-    PRESLIDING, SCALE, SHARED, TILT, VISCOUS,
+    ALL, COULOMB, JOINT, MAP_DRY, MAP_TORQUE, MOMENT, OFFSET, PAYLOAD, PRESLIDING, SCALE, SHARED,
+    STRIBECK, STRIBECK_OFFSET, TILT, VISCOUS,
 };
 
 /// Standard deviation of the prior relative to the bound, for payload, tilt and friction.
@@ -57,12 +57,13 @@ const MAP_TORQUE_SHARE: f64 = 0.05;
 const MAP_DRY_SHARE: f64 = 0.2;
 /// Standard deviation of the map's second differences relative to that of its coefficients, which determines its smoothness.
 const SMOOTHNESS: f64 = 0.5;
-/// Standard deviation of the relative error of the presliding distance, and its bound.
+/// Standard deviation of the change of the logarithm of the presliding distance, and its bound.
 const PRESLIDING_STD: f64 = 0.3;
 const PRESLIDING_BOUND: f64 = 1.0;
-/// Standard deviation of the change of the breakaway torque in proportion to the Coulomb friction, and its bound.
-const BREAKAWAY_SHARE: f64 = 0.1;
-const BREAKAWAY_BOUND: f64 = 0.5;
+/// Standard deviation of the change of the Stribeck effect in proportion to the Coulomb friction, and its bound. That of its offset is
+/// as the offset's. Both are small: of a joint that only creeps, they are not told apart from what is requested.
+const STRIBECK_SHARE: f64 = 0.05;
+const STRIBECK_BOUND: f64 = 0.5;
 /// Minimum standard deviation, so that no precision is infinite.
 const MIN_STD: f64 = 1e-9;
 /// Share of the dry friction, and of the torque limit, in the noise of a joint's torque.
@@ -139,8 +140,8 @@ fn joint_precision(bound: &DVector<f64>, coulomb_nm: f64) -> DMatrix<f64> {
     }
     for (index, deviation) in [
         (PRESLIDING, PRESLIDING_STD),
-        (BREAKAWAY, BREAKAWAY_SHARE * coulomb_nm),
-        (BREAKAWAY_OFFSET, BREAKAWAY_SHARE * coulomb_nm),
+        (STRIBECK, STRIBECK_SHARE * coulomb_nm),
+        (STRIBECK_OFFSET, OFFSET_SHARE * bound[OFFSET]),
     ] {
         matrix[(index, index)] = precision(deviation);
     }
@@ -170,10 +171,10 @@ fn joint_bound<const N: usize>(
     joint: usize,
 ) -> DVector<f64> {
     let mut bound = joint_of(box_of, joint);
-    let breakaway_nm = BREAKAWAY_BOUND * config.friction[joint].coulomb_nm;
+    let stribeck_nm = STRIBECK_BOUND * config.friction[joint].coulomb_nm;
     bound[PRESLIDING] = PRESLIDING_BOUND;
-    bound[BREAKAWAY] = breakaway_nm;
-    bound[BREAKAWAY_OFFSET] = breakaway_nm;
+    bound[STRIBECK] = stribeck_nm;
+    bound[STRIBECK_OFFSET] = stribeck_nm;
     bound
 }
 

@@ -15,8 +15,8 @@
 //! [`Friction::direction_after`]: supple_core::Friction::direction_after
 
 use crate::prior::unknowns::{
-    ALL, BREAKAWAY, BREAKAWAY_OFFSET, COULOMB, MAP_DRY, MAP_TORQUE, MOMENT, OFFSET, PAYLOAD,
-    PRESLIDING, SCALE, TILT, VISCOUS,
+    ALL, COULOMB, MAP_DRY, MAP_TORQUE, MOMENT, OFFSET, PAYLOAD, PRESLIDING, SCALE, STRIBECK,
+    STRIBECK_OFFSET, TILT, VISCOUS,
 };
 use crate::travel::Travel;
 use std::collections::VecDeque;
@@ -24,7 +24,7 @@ use supple_core::controller::CycleRecord;
 use supple_core::dynamics::{Terms, terms};
 use supple_core::learned::MapWeights;
 use supple_core::learned_torque::{payload_torque_nm, tilt_torque_nm};
-use supple_core::math::{Vector3, exp, log};
+use supple_core::math::{Vector3, abs, exp};
 use supple_core::{Config, Friction, Vector};
 
 /// Bandwidth of the filter `F` \[rad/s\].
@@ -76,6 +76,9 @@ pub struct Rows<const N: usize> {
     commands: VecDeque<Vector<N>>,
     /// Direction of each joint's dry friction, -1 to 1.
     direction: Vector<N>,
+    /// Derivative of this direction with respect to the logarithm of the presliding distance.
+    by_presliding: Vector<N>,
+    /// Travel of each joint.
     travel: [Travel; N],
     /// `F p`, and `F[G + D - C^T qd]`, `F[tau]`.
     momentum: Vector<N>,
@@ -100,6 +103,7 @@ impl<const N: usize> Rows<N> {
             torque: [Vector::zeros(); 2],
             commands: VecDeque::new(),
             direction: Vector::zeros(),
+            by_presliding: Vector::zeros(),
             travel: [Travel::new(); N],
             momentum: Vector::zeros(),
             model: Vector::zeros(),
@@ -153,12 +157,16 @@ impl<const N: usize> Rows<N> {
             let friction = &config.friction[i];
             if friction.presliding_rad == 0.0 || first {
                 self.direction[i] = friction.direction(velocity[i]);
+                self.by_presliding[i] = 0.0;
                 continue;
             }
             let measured_rad = record.position_rad[i];
             let travel_rad = self.travel[i].to(measured_rad, q[i], friction.presliding_rad);
             if travel_rad != 0.0 {
-                self.direction[i] = friction.direction_after(self.direction[i], travel_rad);
+                let before = (self.direction[i], self.by_presliding[i]);
+                self.direction[i] = friction.direction_after(before.0, travel_rad);
+                self.by_presliding[i] =
+                    derivative_after(before, travel_rad, friction.presliding_rad);
             }
         }
         let direction = self.direction;
@@ -216,7 +224,7 @@ impl<const N: usize> Rows<N> {
         &self,
         q: &Vector<N>,
         velocity: &Vector<N>,
-        friction: &[Friction; N],
+        loaded: &[Friction; N],
     ) -> Vec<[f64; ALL]> {
         let config = &self.config;
         let gravity = config.arm.gravity();
@@ -236,15 +244,11 @@ impl<const N: usize> Rows<N> {
                 columns[VISCOUS] = velocity[i];
                 columns[COULOMB] = direction;
                 columns[OFFSET] = 1.0;
-                let friction = &friction[i];
-                if friction.presliding_rad > 0.0 {
-                    let size_nm = friction.dry_size_nm(velocity[i]);
-                    columns[PRESLIDING] =
-                        size_nm * direction_by_presliding(direction, self.travel[i].sign());
-                }
-                let s = velocity[i] / friction.stribeck_rad_per_s;
-                columns[BREAKAWAY] = exp(-s * s) * direction;
-                columns[BREAKAWAY_OFFSET] = exp(-s * s);
+                let loaded = &loaded[i];
+                columns[PRESLIDING] = loaded.dry_size_nm(velocity[i]) * self.by_presliding[i];
+                let relative = velocity[i] / loaded.stribeck_rad_per_s;
+                columns[STRIBECK_OFFSET] = exp(-relative * relative);
+                columns[STRIBECK] = columns[STRIBECK_OFFSET] * direction;
                 for (k, weight) in map.weights.iter().enumerate() {
                     columns[MAP_TORQUE + map.first + k] = *weight;
                     columns[MAP_DRY + map.first + k] = weight * direction;
@@ -261,11 +265,15 @@ impl<const N: usize> Rows<N> {
     }
 }
 
-/// Returns the derivative of the direction of dry friction with respect to the logarithm of the presliding distance, after travel
-/// with this sign that began with the friction fully reversed.
-fn direction_by_presliding(direction: f64, sign: f64) -> f64 {
-    let left = (1.0 - direction * sign).clamp(f64::MIN_POSITIVE, 2.0);
-    -sign * left * log(2.0 / left)
+/// Returns the derivative of the direction of dry friction with respect to the logarithm of the presliding distance after some travel;
+/// `before` are the direction and its derivative before it.
+fn derivative_after(before: (f64, f64), travel_rad: f64, presliding_rad: f64) -> f64 {
+    let (direction, derivative) = before;
+    let (to, relative) = (
+        1.0_f64.copysign(travel_rad),
+        abs(travel_rad) / presliding_rad,
+    );
+    (derivative + (direction - to) * relative) * exp(-relative)
 }
 
 /// Returns the torques of a unit mass, and of each unit of its first moment.
@@ -286,27 +294,35 @@ fn payload_columns<const N: usize>(
 
 #[cfg(test)]
 mod tests {
-    use super::direction_by_presliding;
+    use super::derivative_after;
     use supple_core::Friction;
 
-    /// The derivative is that of the law itself, by differences.
+    /// The derivative is that of the law, by differences, also after reversals within the presliding distance.
     #[test]
     fn the_derivative_by_the_presliding_distance_is_that_of_the_friction() {
-        let direction = |presliding_rad: f64, travel_rad: f64| {
+        let (presliding_rad, h) = (2e-3, 1e-5);
+        let after = |presliding_rad: f64, travels_rad: &[f64]| {
             let friction = Friction {
                 presliding_rad,
                 ..Friction::coulomb(0.1, 0.5)
             };
-            friction.direction_after(-travel_rad.signum(), travel_rad)
+            let along = travels_rad.iter();
+            along.fold(0.2, |direction, travel_rad| {
+                friction.direction_after(direction, *travel_rad)
+            })
         };
-        for travel_rad in [1e-4, 1e-3, 5e-3, -1e-3, -5e-3] {
-            let (d, h) = (2e-3_f64, 1e-4);
-            let difference =
-                direction(d * (1.0 + h), travel_rad) - direction(d * (1.0 - h), travel_rad);
-            let expected = difference / (2.0 * h);
-            let found = direction_by_presliding(direction(d, travel_rad), travel_rad.signum());
-            assert!((found - expected).abs() < 1e-6, "{found}, {expected}");
+        let travels_rad = [1e-3, -4e-4, -3e-3, 2e-4, 5e-3, 1e-2, -1e-3, -2e-3];
+        let mut derivative = 0.0;
+        for k in 0..travels_rad.len() {
+            let direction = after(presliding_rad, &travels_rad[..k]);
+            derivative = derivative_after((direction, derivative), travels_rad[k], presliding_rad);
+            let of = |factor: f64| after(presliding_rad * factor, &travels_rad[..=k]);
+            let expected = (of(1.0 + h) - of(1.0 - h)) / (2.0 * h);
+            assert!(
+                (derivative - expected).abs() < 1e-7,
+                "{k}: {derivative}, {expected}"
+            );
         }
-        assert!(direction_by_presliding(1.0, 1.0).abs() < 1e-12);
+        assert!(derivative.abs() > 0.1, "{derivative}");
     }
 }
