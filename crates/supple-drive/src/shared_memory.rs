@@ -7,13 +7,12 @@ use supple_ipc::message::{self, ArmState, PlantReport, TorqueCommand};
 use supple_ipc::{IpcError, PlantLink};
 use supple_realtime::{Stop, pause};
 
-/// Interval in virtual time at which the link checks for an answer, for a shutdown request and whether there is a controller.
+/// Interval in virtual time at which the link checks for an answer and for a shutdown request.
 const ANSWER_POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Poll interval for a controller to join, and time for an answer once the controller is lost.
 const JOIN_POLL_INTERVAL: Duration = Duration::from_millis(1);
-/// Number of polls without an answer after which a controller whose process exists counts as lost in virtual time (a minute): it
-/// may wait for a reader of its telemetry that the machine keeps from running.
-const MAX_UNANSWERED_POLLS: u32 = 1200;
+/// Number of polls without an answer after which the controller counts as lost in virtual time (2 s).
+const MAX_UNANSWERED_POLLS: u32 = 40;
 
 /// The plant's link to the controller through shared memory.
 pub struct SharedMemoryLink {
@@ -28,8 +27,7 @@ pub struct SharedMemoryLink {
 
 impl SharedMemoryLink {
     /// Creates the link. In real time it waits for an answer as long as the cycle allows. In virtual time, which does not
-    /// advance during the wait, it waits until the answer arrives; the controller counts as lost once its process has ended, at the latest
-    /// after a minute.
+    /// advance during the wait, it waits until the answer arrives or the controller counts as lost after 2 s.
     pub fn new(link: PlantLink, virtual_time: bool, stop: Stop) -> SharedMemoryLink {
         SharedMemoryLink {
             link,
@@ -122,7 +120,6 @@ impl<const N: usize> Link<N> for SharedMemoryLink {
             (true, true) => JOIN_POLL_INTERVAL,
             (true, false) => ANSWER_POLL_INTERVAL,
         };
-        let mut ended = false;
         for _ in 0..polls {
             let received = self.link.answer(cycle, wait)?;
             late += received.late;
@@ -133,11 +130,9 @@ impl<const N: usize> Link<N> for SharedMemoryLink {
                     late,
                 });
             }
-            if ended || self.stop.shutdown_requested() {
+            if self.stop.shutdown_requested() {
                 break;
             }
-            // An answer that it sent before its end is read once more.
-            ended = self.virtual_time && !self.link.has_controller()?;
         }
         self.lost = self.virtual_time;
         Ok(Answer {

@@ -10,7 +10,7 @@
 
 use crate::cleanup::SharedMemoryCleanup;
 use crate::domain::Domain;
-use crate::error::{IpcError, failed};
+use crate::error::IpcError;
 use crate::message::{ArmState, TorqueCommand, WakeRequest};
 use crate::port::{Backpressure, QualityOfService, Reader, Writer};
 use crate::wake::{WaitResult, WakeReason, WakeReceiver, WakeSender};
@@ -131,17 +131,6 @@ impl PlantLink {
     /// Number of commands discarded because this system's controller did not write them.
     pub fn foreign(&self) -> u64 {
         self.controller.dropped()
-    }
-
-    /// Returns whether a controller has joined and has not left; its process may be stopped or blocked. A controller that joins at this
-    /// moment may wait a millisecond longer; if this process is stopped at this moment for longer than 0.2 s, it is refused. Opens no
-    /// file and allocates no memory.
-    ///
-    /// # Errors
-    /// [`IpcError::Service`].
-    pub fn has_controller(&self) -> Result<bool, IpcError> {
-        let has = self.controller.has_writer();
-        has.map_err(|error| failed(COMMANDS.name, &error))
     }
 
     /// Notifies the controller that a state follows within some tens or hundreds of microseconds, so that the controller can do
@@ -427,20 +416,6 @@ mod tests {
             let received = plant.answer(cycle, TIMEOUT).expect("read");
             assert_eq!(received.answer, Some(command));
         }
-    }
-
-    #[test]
-    fn a_controller_is_there_from_joining_to_leaving() {
-        let folder = tempfile::tempdir().expect("a folder");
-        let domain = Domain::in_folder(&folder.path().join("run"), "there").expect("a domain");
-        let plant = PlantLink::new(&domain).expect("a plant");
-        for _ in 0..2 {
-            assert!(!plant.has_controller().expect("read"));
-            let controller = ControllerLink::new(&domain).expect("a controller");
-            assert!(plant.has_controller().expect("read"));
-            drop(controller);
-        }
-        assert!(!plant.has_controller().expect("read"));
     }
 
     #[test]

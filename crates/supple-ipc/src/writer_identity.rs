@@ -10,8 +10,6 @@ use crate::error::IpcError;
 use crate::error::failed;
 use crate::membership;
 use core::cell::Cell;
-use rustix::fs::{FlockOperation, flock};
-use rustix::io::Errno;
 use rustix::rand::{GetRandomFlags, getrandom};
 use std::fs::File;
 use std::io;
@@ -90,18 +88,6 @@ impl WriterFilter {
     /// Number of messages with another writer id.
     pub fn dropped(&self) -> u64 {
         self.dropped.get()
-    }
-
-    /// Returns whether a process holds the writer lock. The kernel releases it when the process ends for any reason.
-    pub fn has_writer(&self) -> io::Result<bool> {
-        match flock(&self.file, FlockOperation::NonBlockingLockShared) {
-            Ok(()) => {
-                flock(&self.file, FlockOperation::Unlock)?;
-                Ok(false)
-            }
-            Err(Errno::WOULDBLOCK) => Ok(true),
-            Err(error) => Err(error.into()),
-        }
     }
 
     fn matches_lock_holder(&self, writer_id: u64) -> bool {
