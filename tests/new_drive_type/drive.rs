@@ -254,12 +254,12 @@ impl<const N: usize, B: Bus> Drive<N> for Moteus<N, B> {
     }
 
     fn drain(&mut self, next_period_ns: u64) -> Result<(), LoopError> {
-        self.skip(next_period_ns)?;
+        self.skip(0, next_period_ns)?;
         self.port.end_cycle();
         Ok(())
     }
 
-    fn skip(&mut self, next_period_ns: u64) -> Result<(), LoopError> {
+    fn skip(&mut self, _: u64, next_period_ns: u64) -> Result<(), LoopError> {
         while self.receive(next_period_ns, u32::MAX)? {}
         Ok(())
     }

@@ -186,11 +186,12 @@ pub trait Drive<const N: usize> {
     /// If the bus itself fails.
     fn drain(&mut self, next_period_ns: u64) -> Result<(), LoopError>;
 
-    /// Receives until `next_period_ns` in a period that is skipped.
+    /// Receives until `next_period_ns`, the start of the period after those that are skipped; with a simulated arm, moves it by
+    /// `periods`.
     ///
     /// # Errors
     /// If the bus itself fails.
-    fn skip(&mut self, next_period_ns: u64) -> Result<(), LoopError>;
+    fn skip(&mut self, periods: u64, next_period_ns: u64) -> Result<(), LoopError>;
 
     /// Whether any motor replied in the last cycle.
     fn motors_replied(&self) -> bool;

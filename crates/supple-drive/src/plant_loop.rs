@@ -242,10 +242,12 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         let now_ns = self.drive.now_ns();
         let period_ns = self.cycle_config.period_ns;
         let late_ns = now_ns.saturating_sub(self.next_period_ns);
-        self.skip_periods(late_ns / period_ns);
-        if late_ns % period_ns > self.slack_ns() {
-            self.skip_periods(1);
-            self.drive.skip(self.next_period_ns)?;
+        let skipped = late_ns / period_ns + u64::from(late_ns % period_ns > self.slack_ns());
+        if skipped > 0 {
+            self.cycle += skipped;
+            self.next_period_ns += skipped * period_ns;
+            self.counters.skipped += skipped;
+            self.drive.skip(skipped, self.next_period_ns)?;
         }
         self.counters.wake_ns = late_ns;
         self.counters.cycles += 1;
@@ -263,12 +265,6 @@ impl<const N: usize, D: Drive<N>, L: Link<N>> PlantLoop<N, D, L> {
         let reserved_ns = self.reserved.states_ns + self.reserved.torques_ns;
         let needed_ns = reserved_ns + self.cycle_config.answer_ns;
         self.cycle_config.period_ns.saturating_sub(needed_ns)
-    }
-
-    fn skip_periods(&mut self, periods: u64) {
-        self.cycle += periods;
-        self.next_period_ns += periods * self.cycle_config.period_ns;
-        self.counters.skipped += periods;
     }
 
     fn arm_report(&mut self, start_ns: u64) -> ArmReport<N> {

@@ -73,16 +73,16 @@ impl<const N: usize> Moves<N> {
     }
 
     /// Ends the trajectory if the arm has left the move mode: an operator's request or a fault must not be followed by the next
-    /// move. Returns whether this has ended it.
+    /// move. Returns whether a move was cut short by this, or the next one is not sent.
     fn check_mode(&mut self, mode: Option<Mode>) -> bool {
         let is_moving = mode == Some(Mode::Move);
-        let was_ended = self.has_moved && !is_moving && self.sent.is_none();
-        let had_more = !self.waiting.is_empty();
+        let has_left = self.has_moved && !is_moving && self.sent.is_none();
+        let is_unfinished = self.ends.is_some() || !self.waiting.is_empty();
         self.has_moved |= is_moving && self.ends.is_some();
-        if was_ended {
+        if has_left {
             self.clear();
         }
-        was_ended && had_more
+        has_left && is_unfinished
     }
 }
 
@@ -145,9 +145,14 @@ impl<const N: usize> Bridge<N> {
     pub fn run(&mut self, stop: &Stop, tell: &dyn Fn(&str)) -> Result<(), RosError> {
         while !stop.shutdown_requested() {
             while let Some(telemetry) = self.reader.receive()? {
-                if telemetry.dof() == N && self.moves.check_mode(telemetry.record_of::<N>().mode())
-                {
-                    tell("the arm has left the move mode: the trajectory ends");
+                if telemetry.dof() == N {
+                    let mode = telemetry.record_of::<N>().mode();
+                    if self.moves.check_mode(mode) {
+                        let now = mode.map_or("unknown", Mode::name);
+                        tell(&format!(
+                            "the arm has left the move mode, its mode is {now}: the trajectory ends"
+                        ));
+                    }
                 }
                 self.publish(&telemetry)?;
             }
@@ -219,6 +224,9 @@ impl<const N: usize> Bridge<N> {
             && Instant::now() >= ends
         {
             self.moves.ends = None;
+            if self.moves.waiting.is_empty() {
+                tell("the last move of the trajectory has ended");
+            }
         }
         if !self.moves.is_idle() {
             return Ok(());

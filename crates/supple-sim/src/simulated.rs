@@ -283,7 +283,11 @@ impl<const N: usize> Drive<N> for SimulatedArm<N> {
         Ok(())
     }
 
-    fn skip(&mut self, next_period_ns: u64) -> Result<(), LoopError> {
+    /// The motors keep the last torque.
+    fn skip(&mut self, periods: u64, next_period_ns: u64) -> Result<(), LoopError> {
+        for _ in 0..periods {
+            self.advance();
+        }
         self.wait_for(next_period_ns);
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! Behaviour of the drives with and without answers, in the loop that every arm has: the fallback torque acts until the
 //! motors brake, 10 ms after the last answer, and braking only dissipates energy.
 
+use core::time::Duration;
 use supple_core::Vector;
 use supple_core::controller::codes::fault_kind;
 use supple_core::controller::{Controller, Mode, Request, State};
@@ -44,11 +45,15 @@ struct Motors(Simulation<4, Scripted>);
 
 impl Motors {
     fn new() -> Motors {
+        Motors::with_time(true)
+    }
+
+    fn with_time(virtual_time: bool) -> Motors {
         let description = Description::asset("wam4").expect("built in");
         let plant = PlantConfig::from_description(&description).expect("valid");
         let home = description.home::<4>().expect("four joints");
         let plant = Plant::new(plant, home, Vector::zeros()).expect("valid");
-        let arm = SimulatedArm::new(plant, true, 0.75);
+        let arm = SimulatedArm::new(plant, virtual_time, 0.75);
         let config = description.config().expect("valid");
         Motors(simulation(arm, Scripted::default(), &config).expect("no bus is needed"))
     }
@@ -273,4 +278,21 @@ fn skipped_periods_do_not_count_as_speed() {
     for _ in 0..50 {
         assert_eq!(cycle(&mut guard, 1), Ok(()));
     }
+}
+
+/// A loop that wakes late skips periods; the arm moves on meanwhile. Else the controller would see it move by one period in
+/// several, as after a collision.
+#[test]
+fn the_arm_moves_in_skipped_periods() {
+    let mut motors = Motors::with_time(false);
+    let hold = answer(Some(Request::GravityHold));
+    for cycle in 0..30 {
+        if cycle % 10 == 5 {
+            supple_realtime::pause(Duration::from_millis(5));
+        }
+        motors.cycle(Some(&hold));
+        let plant_cycle = motors.0.drive().plant().measurement().cycle;
+        assert_eq!(plant_cycle, motors.0.cycle_number());
+    }
+    assert!(motors.0.cycle_number() >= 40, "no periods were skipped");
 }

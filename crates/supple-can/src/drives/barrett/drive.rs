@@ -122,6 +122,11 @@ impl<const N: usize, B: Bus> Barrett<N, B> {
         self.pendant.as_ref()
     }
 
+    fn receive_until(&mut self, until_ns: u64) -> Result<(), LoopError> {
+        while self.receive(until_ns, u32::MAX)? {}
+        Ok(())
+    }
+
     /// Receives one event; returns `false` if none arrived until `until_ns`.
     fn receive(&mut self, until_ns: u64, frames: u32) -> Result<bool, LoopError> {
         match self.port.receive(until_ns, frames)? {
@@ -322,14 +327,13 @@ impl<const N: usize, B: Bus> Drive<N> for Barrett<N, B> {
     }
 
     fn drain(&mut self, next_period_ns: u64) -> Result<(), LoopError> {
-        self.skip(next_period_ns)?;
+        self.receive_until(next_period_ns)?;
         self.port.end_cycle();
         Ok(())
     }
 
-    fn skip(&mut self, next_period_ns: u64) -> Result<(), LoopError> {
-        while self.receive(next_period_ns, u32::MAX)? {}
-        Ok(())
+    fn skip(&mut self, _: u64, next_period_ns: u64) -> Result<(), LoopError> {
+        self.receive_until(next_period_ns)
     }
 
     fn motors_replied(&self) -> bool {

@@ -84,6 +84,11 @@ impl<const N: usize, B: Bus> Damiao<N, B> {
         self.port.into_bus()
     }
 
+    fn receive_until(&mut self, until_ns: u64) -> Result<(), LoopError> {
+        while self.receive(until_ns, u32::MAX)? {}
+        Ok(())
+    }
+
     fn receive(&mut self, until_ns: u64, frames: u32) -> Result<bool, LoopError> {
         match self.port.receive(until_ns, frames)? {
             Received::Nothing => return Ok(false),
@@ -311,14 +316,13 @@ impl<const N: usize, B: Bus> Drive<N> for Damiao<N, B> {
     }
 
     fn drain(&mut self, next_period_ns: u64) -> Result<(), LoopError> {
-        self.skip(next_period_ns)?;
+        self.receive_until(next_period_ns)?;
         self.port.end_cycle();
         Ok(())
     }
 
-    fn skip(&mut self, next_period_ns: u64) -> Result<(), LoopError> {
-        while self.receive(next_period_ns, u32::MAX)? {}
-        Ok(())
+    fn skip(&mut self, _: u64, next_period_ns: u64) -> Result<(), LoopError> {
+        self.receive_until(next_period_ns)
     }
 
     fn motors_replied(&self) -> bool {
