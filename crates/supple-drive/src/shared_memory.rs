@@ -11,8 +11,11 @@ use supple_realtime::{Stop, pause};
 const ANSWER_POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Poll interval for a controller to join, and time for an answer once the controller is lost.
 const JOIN_POLL_INTERVAL: Duration = Duration::from_millis(1);
-/// Number of polls without an answer after which the controller counts as lost in virtual time (2 s).
+/// Numbers of polls without an answer after which the controller counts as lost in virtual time: if it has left or another one has
+/// replaced it (2 s), and if it exists (a minute). One that exists may be blocked by a reader of its telemetry that the machine keeps
+/// from running.
 const MAX_UNANSWERED_POLLS: u32 = 40;
+const MAX_UNANSWERED_POLLS_OF_EXISTING: u32 = 1200;
 
 /// The plant's link to the controller through shared memory.
 pub struct SharedMemoryLink {
@@ -27,7 +30,8 @@ pub struct SharedMemoryLink {
 
 impl SharedMemoryLink {
     /// Creates the link. In real time it waits for an answer as long as the cycle allows. In virtual time, which does not
-    /// advance during the wait, it waits until the answer arrives or the controller counts as lost after 2 s.
+    /// advance during the wait, it waits until the answer arrives or the controller counts as lost: after 2 s if it has left or another
+    /// one has replaced it, else after a minute.
     pub fn new(link: PlantLink, virtual_time: bool, stop: Stop) -> SharedMemoryLink {
         SharedMemoryLink {
             link,
@@ -113,14 +117,14 @@ impl<const N: usize> Link<N> for SharedMemoryLink {
         let mut late = 0;
         let polls = match (self.virtual_time, self.lost) {
             (false, _) | (true, true) => 1,
-            (true, false) => MAX_UNANSWERED_POLLS,
+            (true, false) => MAX_UNANSWERED_POLLS_OF_EXISTING,
         };
         let wait = match (self.virtual_time, self.lost) {
             (false, _) => Duration::from_nanos(wait_ns),
             (true, true) => JOIN_POLL_INTERVAL,
             (true, false) => ANSWER_POLL_INTERVAL,
         };
-        for _ in 0..polls {
+        for poll in 1..=polls {
             let received = self.link.answer(cycle, wait)?;
             late += received.late;
             if let Some(command) = received.answer {
@@ -131,6 +135,9 @@ impl<const N: usize> Link<N> for SharedMemoryLink {
                 });
             }
             if self.stop.shutdown_requested() {
+                break;
+            }
+            if poll >= MAX_UNANSWERED_POLLS && !self.link.has_same_controller()? {
                 break;
             }
         }

@@ -10,6 +10,8 @@ use crate::error::IpcError;
 use crate::error::failed;
 use crate::membership;
 use core::cell::Cell;
+use rustix::fs::{FlockOperation, flock};
+use rustix::io::Errno;
 use rustix::rand::{GetRandomFlags, getrandom};
 use std::fs::File;
 use std::io;
@@ -88,6 +90,22 @@ impl WriterFilter {
     /// Number of messages with another writer id.
     pub fn dropped(&self) -> u64 {
         self.dropped.get()
+    }
+
+    /// Returns whether a process holds the writer lock, and whether it is the one whose message was accepted last, if any was. The
+    /// kernel releases the lock when the process ends for any reason.
+    pub fn last_writer_exists(&self) -> io::Result<bool> {
+        match flock(&self.file, FlockOperation::NonBlockingLockShared) {
+            Ok(()) => {
+                flock(&self.file, FlockOperation::Unlock)?;
+                Ok(false)
+            }
+            Err(Errno::WOULDBLOCK) => {
+                let last = self.writer_id.get();
+                Ok(last == 0 || self.matches_lock_holder(last))
+            }
+            Err(error) => Err(error.into()),
+        }
     }
 
     fn matches_lock_holder(&self, writer_id: u64) -> bool {

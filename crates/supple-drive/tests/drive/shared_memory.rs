@@ -1,4 +1,5 @@
-//! Tests of the link to the controller: it discards commands for another arm without an error.
+//! Tests of the link to the controller: it discards commands for another arm without an error, and in virtual time it waits for a
+//! controller as long as its process exists.
 
 use core::time::Duration;
 use supple_core::{Controller, State, step};
@@ -9,6 +10,47 @@ use supple_model::Description;
 use supple_realtime::Stop;
 
 const TIMEOUT: Duration = Duration::from_secs(5);
+
+fn report(cycle: u64, position_rad: [f64; 4]) -> ArmReport<4> {
+    ArmReport {
+        cycle,
+        stamp_ns: cycle * 1_000_000,
+        position_rad: position_rad.map(Some),
+        tip_force_n: None,
+        drives: Drives::Idle,
+        counters: Counters::default(),
+    }
+}
+
+/// A controller may wait for a reader of its telemetry for more than two seconds; one that has ended is not waited for any longer.
+#[test]
+fn in_virtual_time_a_slow_controller_is_waited_for_and_an_ended_one_is_not() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let domain = Domain::in_folder(&folder.path().join("run"), "slow").expect("a domain");
+    let plant = PlantLink::new(&domain).expect("a plant");
+    let mut link = SharedMemoryLink::new(plant, true, Stop::default());
+    let description = Description::asset("wam4").expect("built in");
+    let home = description.home::<4>().expect("four joints");
+    let controller = || Controller::<4>::new(description.config().expect("valid")).expect("valid");
+    std::thread::scope(|scope| {
+        let slow = scope.spawn(|| {
+            let link = ControllerLink::new(&domain).expect("a controller");
+            let state = link.wait(TIMEOUT).expect("read").expect("a state");
+            let controller = controller();
+            let input = state.input(None).expect("four joints");
+            let output = step(&controller, &mut State::new(&controller), &input);
+            supple_realtime::pause(Duration::from_millis(2500));
+            let command = TorqueCommand::new(&output, false);
+            link.answer(&command).expect("answered");
+        });
+        link.publish(&report(0, home.into())).expect("published");
+        let answer = Link::<4>::answer(&mut link, 0, 0).expect("no error");
+        assert!(answer.command.is_some());
+        slow.join().expect("no panic");
+    });
+    let answer = Link::<4>::answer(&mut link, 1, 0).expect("no error");
+    assert!(answer.command.is_none());
+}
 
 #[test]
 fn a_command_for_another_arm_is_counted_and_the_next_is_accepted() {
@@ -23,15 +65,8 @@ fn a_command_for_another_arm_is_counted_and_the_next_is_accepted() {
         Controller::new(description.config().expect("valid")).expect("valid");
     let mut state = State::new(&controller);
     for cycle in 0..6 {
-        let report = ArmReport::<4> {
-            cycle,
-            stamp_ns: cycle * 1_000_000,
-            position_rad: core::array::from_fn(|i| Some(home[i])),
-            tip_force_n: None,
-            drives: Drives::Idle,
-            counters: Counters::default(),
-        };
-        link.publish(&report).expect("published");
+        link.publish(&report(cycle, home.into()))
+            .expect("published");
         let arm = controller_link
             .wait(TIMEOUT)
             .expect("read")
