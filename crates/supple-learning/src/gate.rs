@@ -83,7 +83,12 @@ impl SlidingGate {
 
     /// Returns whether the joint slides in one direction.
     pub(crate) fn is_open(&self) -> bool {
-        self.since_slow_s >= self.settle_s || self.creeps_s >= CREEPS_S
+        self.since_slow_s >= self.settle_s || self.creeps()
+    }
+
+    /// Returns whether the joint creeps in one direction.
+    pub(crate) fn creeps(&self) -> bool {
+        self.creeps_s >= CREEPS_S
     }
 }
 

@@ -15,6 +15,8 @@ pub struct Information {
     pub square: f64,
     /// Sum of the weights.
     pub weight: f64,
+    /// Sum of the weights of the samples in which the joint creeps.
+    pub creeping_weight: f64,
 }
 
 impl Information {
@@ -25,6 +27,7 @@ impl Information {
             right: DVector::zeros(ALL),
             square: 0.0,
             weight: 0.0,
+            creeping_weight: 0.0,
         }
     }
 
@@ -39,13 +42,16 @@ impl Information {
         0.5 * (self.gram[(COULOMB, COULOMB)] - self.gram[(COULOMB, OFFSET)].abs())
     }
 
-    /// Adds an equation.
-    pub fn add(&mut self, row: &Row, weight: f64) {
+    /// Adds an equation of a joint that creeps, or not.
+    pub fn add(&mut self, row: &Row, weight: f64, creeps: bool) {
         let a = DVector::from_column_slice(&row.columns);
         self.gram.ger(weight, &a, &a, 1.0);
         self.right.axpy(weight * row.error_nm, &a, 1.0);
         self.square += weight * row.error_nm * row.error_nm;
         self.weight += weight;
+        if creeps {
+            self.creeping_weight += weight;
+        }
     }
 
     /// Adds the samples of `other`.
@@ -54,6 +60,7 @@ impl Information {
         self.right += &other.right;
         self.square += other.square;
         self.weight += other.weight;
+        self.creeping_weight += other.creeping_weight;
     }
 
     /// Multiplies the weight of all samples by `kept`.
@@ -62,6 +69,7 @@ impl Information {
         self.right *= kept;
         self.square *= kept;
         self.weight *= kept;
+        self.creeping_weight *= kept;
     }
 
     /// Returns the mean square of the error that remains with these `unknowns` \[N^2 m^2\].

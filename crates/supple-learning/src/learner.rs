@@ -34,8 +34,9 @@ const DISTURBED: f64 = 4.0;
 const PERSISTENT_S: f64 = 20.0;
 /// Factor of the weight of older samples after such a change.
 const KEPT_AFTER_CHANGE: f64 = 0.02;
-/// Time of samples that a joint must have in each direction before they are used \[s\]. In one direction, dry friction is not told
-/// apart from an offset or a payload, and the errors of a short motion have one sign.
+/// Time of samples that a joint must have in each direction before they are used, or in one if it creeps \[s\]. In one direction, dry
+/// friction is not told apart from an offset or a payload, and the errors of a short motion have one sign. But a joint that creeps may
+/// never reverse: what is left of its friction drives it on in one direction, and that sum is what its samples determine.
 const MIN_DIRECTION_S: f64 = 0.25;
 /// Time between estimates \[s\].
 const SOLVE_S: f64 = 1.0;
@@ -85,8 +86,8 @@ pub struct Learner<const N: usize> {
     collecting: Vec<Information>,
     waiting: VecDeque<Vec<Information>>,
     samples: Vec<Information>,
-    /// Whether the samples of each joint have had both directions of motion; those of other joints are not used yet.
-    both_directions: [bool; N],
+    /// Whether the samples of each joint have been enough; those of other joints are not used yet.
+    counts: [bool; N],
     /// Joints whose map a request has changed.
     requested: [bool; N],
     estimate: Option<Estimate>,
@@ -117,7 +118,7 @@ impl<const N: usize> Learner<N> {
             collecting: vec![Information::empty(); N],
             waiting: VecDeque::new(),
             samples: vec![Information::empty(); N],
-            both_directions: [false; N],
+            counts: [false; N],
             requested: [false; N],
             since_solve_s: 0.0,
             has_new_samples: false,
@@ -132,7 +133,7 @@ impl<const N: usize> Learner<N> {
     /// Forgets all samples and resets the estimate to the prior.
     pub fn reset(&mut self) {
         self.samples = vec![Information::empty(); N];
-        self.both_directions = [false; N];
+        self.counts = [false; N];
         self.estimate = of_prior(&self.prior);
         self.residual = [0.0; N];
         self.disturbed_s = 0.0;
@@ -147,7 +148,7 @@ impl<const N: usize> Learner<N> {
         Report {
             terms: of(Estimate::terms),
             deviations: of(Estimate::deviations),
-            learned_s: core::array::from_fn(|i| match self.both_directions[i] {
+            learned_s: core::array::from_fn(|i| match self.counts[i] {
                 true => self.seconds(i, self.samples[i].weight),
                 false => 0.0,
             }),
@@ -229,7 +230,8 @@ impl<const N: usize> Learner<N> {
             if let Some(sum) = sum {
                 let weight =
                     cycles * self.period_s / CORRELATION_S / self.prior.noise_nm[i].powi(2);
-                self.collecting[i].add(&sum.scaled(1.0 / cycles), weight);
+                let creeps = self.gates[i].creeps();
+                self.collecting[i].add(&sum.scaled(1.0 / cycles), weight, creeps);
             }
         }
         self.begin_sample();
@@ -323,7 +325,8 @@ impl<const N: usize> Learner<N> {
             self.samples[i].forget(exp(-learned_s / FORGET_S));
             self.samples[i].merge(new);
             let rarer_s = self.seconds(i, self.samples[i].weight_in_rarer_direction());
-            self.both_directions[i] |= rarer_s >= MIN_DIRECTION_S;
+            let creeping_s = self.seconds(i, self.samples[i].creeping_weight);
+            self.counts[i] |= rarer_s >= MIN_DIRECTION_S || creeping_s >= MIN_DIRECTION_S;
             if let Some(estimate) = &self.estimate {
                 let square = new.mean_square(&estimate.unknowns(i));
                 let known = new.mean_variance(&estimate.covariance[i]);
@@ -334,18 +337,13 @@ impl<const N: usize> Learner<N> {
         self.has_new_samples = true;
     }
 
-    /// Returns the estimate from the joints that have moved in both directions.
+    /// Returns the estimate from the joints that count.
     fn solve(&self) -> Option<Estimate> {
-        let used = |(samples, both): (&Information, bool)| match both {
+        let used = |(samples, counts): (&Information, bool)| match counts {
             true => samples.clone(),
             false => Information::empty(),
         };
-        let used: Vec<_> = self
-            .samples
-            .iter()
-            .zip(self.both_directions)
-            .map(used)
-            .collect();
+        let used: Vec<_> = self.samples.iter().zip(self.counts).map(used).collect();
         solve(&self.prior, &used)
     }
 
@@ -356,7 +354,7 @@ impl<const N: usize> Learner<N> {
         };
         let terms = estimate.terms::<N>();
         self.estimate = Some(estimate);
-        for (requested, counts) in self.requested.iter_mut().zip(self.both_directions) {
+        for (requested, counts) in self.requested.iter_mut().zip(self.counts) {
             *requested |= counts;
         }
         if !self.requested.contains(&true) {
