@@ -120,6 +120,11 @@ impl<const N: usize, B: Bus> Moteus<N, B> {
         self.replies.iter().filter(|reply| reply.is_none()).count() as u32
     }
 
+    fn receive_until(&mut self, until_ns: u64) -> Result<(), LoopError> {
+        while self.receive(until_ns, u32::MAX)? {}
+        Ok(())
+    }
+
     fn receive(&mut self, until_ns: u64, frames: u32) -> Result<bool, LoopError> {
         match self.port.receive(until_ns, frames)? {
             Received::Nothing => return Ok(false),
@@ -254,14 +259,13 @@ impl<const N: usize, B: Bus> Drive<N> for Moteus<N, B> {
     }
 
     fn drain(&mut self, next_period_ns: u64) -> Result<(), LoopError> {
-        self.skip(0, next_period_ns)?;
+        self.receive_until(next_period_ns)?;
         self.port.end_cycle();
         Ok(())
     }
 
     fn skip(&mut self, _: u64, next_period_ns: u64) -> Result<(), LoopError> {
-        while self.receive(next_period_ns, u32::MAX)? {}
-        Ok(())
+        self.receive_until(next_period_ns)
     }
 
     fn motors_replied(&self) -> bool {

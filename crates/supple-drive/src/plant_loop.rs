@@ -6,7 +6,8 @@
 //! ```
 //!
 //! The loop computes no torques, with one exception: if the controller is lost or requests no torque, the loop holds an
-//! arm that falls without torque and lays it down. A cycle allocates no memory, takes no lock and writes no log.
+//! arm that falls without torque and lays it down. A cycle allocates no memory, writes no log
+//! and, in real time, takes no lock.
 
 use crate::budget::Overload;
 use crate::drive::{Drive, LoweringMode, ReservedTimes, TipForce, TorqueOffBehaviour};

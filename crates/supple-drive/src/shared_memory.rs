@@ -11,10 +11,11 @@ use supple_realtime::{Stop, pause};
 const ANSWER_POLL_INTERVAL: Duration = Duration::from_millis(50);
 /// Poll interval for a controller to join, and time for an answer once the controller is lost.
 const JOIN_POLL_INTERVAL: Duration = Duration::from_millis(1);
-/// Numbers of polls without an answer after which the controller counts as lost in virtual time: if it has left or another one has
-/// replaced it (2 s), and if it exists (a minute). One that exists may be blocked by a reader of its telemetry that the machine keeps
-/// from running.
+/// Number of polls without an answer after which a controller that has left, or that another one has replaced, counts as lost in
+/// virtual time (2 s).
 const MAX_UNANSWERED_POLLS: u32 = 40;
+/// The same number for a controller that exists (a minute): it may be blocked by a reader of its telemetry that the machine keeps from
+/// running.
 const MAX_UNANSWERED_POLLS_OF_EXISTING: u32 = 1200;
 
 /// The plant's link to the controller through shared memory.

@@ -5,6 +5,8 @@ use supple_core::math::exp;
 
 /// Minimum time for which a joint must creep in one direction \[s\].
 const CREEPS_S: f64 = 0.1;
+/// The same for one that does not only start or stop, which takes less than half a second \[s\].
+const CREEPS_ON_S: f64 = 1.0;
 /// Minimum speed of a creeping joint, averaged over [`CREEP_AVERAGING_S`] \[rad/s\]: above what the steps of a coarse encoder cause at rest.
 const CREEP_RAD_PER_S: f64 = 1.5e-3;
 /// Time over which the speed of a creeping joint is averaged \[s\].
@@ -83,12 +85,12 @@ impl SlidingGate {
 
     /// Returns whether the joint slides in one direction.
     pub(crate) fn is_open(&self) -> bool {
-        self.since_slow_s >= self.settle_s || self.creeps()
+        self.since_slow_s >= self.settle_s || self.creeps_s >= CREEPS_S
     }
 
-    /// Returns whether the joint creeps in one direction.
-    pub(crate) fn creeps(&self) -> bool {
-        self.creeps_s >= CREEPS_S
+    /// Returns whether the joint has crept in one direction for longer than one that starts or stops.
+    pub(crate) fn creeps_on(&self) -> bool {
+        self.creeps_s >= CREEPS_ON_S
     }
 }
 

@@ -15,7 +15,7 @@ pub struct Information {
     pub square: f64,
     /// Sum of the weights.
     pub weight: f64,
-    /// Sum of the weights of the samples in which the joint creeps.
+    /// Sum of the weights of the samples in which the joint creeps on.
     pub creeping_weight: f64,
 }
 
@@ -42,7 +42,7 @@ impl Information {
         0.5 * (self.gram[(COULOMB, COULOMB)] - self.gram[(COULOMB, OFFSET)].abs())
     }
 
-    /// Adds an equation of a joint that creeps, or not.
+    /// Adds an equation of a joint that creeps on, or not.
     pub fn add(&mut self, row: &Row, weight: f64, creeps: bool) {
         let a = DVector::from_column_slice(&row.columns);
         self.gram.ger(weight, &a, &a, 1.0);

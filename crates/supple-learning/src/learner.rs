@@ -230,7 +230,7 @@ impl<const N: usize> Learner<N> {
             if let Some(sum) = sum {
                 let weight =
                     cycles * self.period_s / CORRELATION_S / self.prior.noise_nm[i].powi(2);
-                let creeps = self.gates[i].creeps();
+                let creeps = self.gates[i].creeps_on();
                 self.collecting[i].add(&sum.scaled(1.0 / cycles), weight, creeps);
             }
         }

@@ -12,7 +12,7 @@
 //! so that no acceleration is differentiated.
 //! **Estimate** ([`solve`]). Recursive least squares with a Gaussian prior around the model and with forgetting: a parameter that
 //! the motion does not excite keeps the model's value. The samples of a joint count once both directions of its motion are among
-//! them. Each number stays within its bounds, [`supple_core::learned::LearnedBounds`].
+//! them, or once it has crept on in one. Each number stays within its bounds, [`supple_core::learned::LearnedBounds`].
 //! **Freeze** ([`FreezeReason`]). Contact, faults, idle drives, torque limits, modes in which people push, and torques that
 //! the present uncertainty does not explain. Samples are used only if none of these follows within half a second.
 

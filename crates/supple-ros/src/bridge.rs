@@ -283,7 +283,9 @@ impl<const N: usize> Bridge<N> {
                 }
                 Outcome::Accepted => {
                     self.moves.sent = None;
-                    self.moves.ends = Some(Instant::now() + duration + REST);
+                    // A request to hold is no move.
+                    self.moves.ends =
+                        (!duration.is_zero()).then(|| Instant::now() + duration + REST);
                 }
                 Outcome::Queued => {}
             }

@@ -98,6 +98,8 @@ pub fn run<const N: usize>(
         .process
         .apply_realtime(Options::NAME, options.priority);
     let result = control.run(&link, stop);
+    // In virtual time the plant waits for a controller that exists.
+    drop(link);
     drop(heartbeat);
     let timing = control.into_timing();
     helper.finish()?;

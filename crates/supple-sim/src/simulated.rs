@@ -8,8 +8,9 @@
 //! loss only once a controller has requested none. In idle the motors are shorted and brake
 //! ([`supple_plant::ActuatorModel`]).
 //!
-//! In real time a period starts at its scheduled time, whatever the controller does; when the host stalls, simulated
-//! time pauses. In virtual time it is as fast as both processes allow.
+//! In real time a period starts at its scheduled time, whatever the controller does; when the host stalls while this
+//! program waits for it, simulated time pauses, and when the period begins late, the arm moves in the periods that are
+//! skipped. In virtual time it is as fast as both processes allow.
 
 use supple_can_frame::BitRates;
 use supple_core::Vector;
@@ -28,6 +29,9 @@ const WAKE_AHEAD_NS: u64 = 50_000;
 /// Lateness above which a period counts as a host stall and pauses simulated time \[ns\], so that a stall is not
 /// charged to the controller. As on the emulated bus.
 const STALL_THRESHOLD_NS: u64 = 100_000;
+
+/// Maximum number of skipped periods in which the arm moves.
+const MAX_SKIPPED: u64 = 100;
 
 /// Clock of the simulated arm.
 #[derive(Clone, Copy, Debug)]
@@ -283,10 +287,13 @@ impl<const N: usize> Drive<N> for SimulatedArm<N> {
         Ok(())
     }
 
-    /// The motors keep the last torque.
+    /// The motors keep the last torque. After more periods than this the controller latches a fault, and the arm stands
+    /// still in them.
     fn skip(&mut self, periods: u64, next_period_ns: u64) -> Result<(), LoopError> {
-        for _ in 0..periods {
+        self.start_ns = next_period_ns.saturating_sub(periods * self.period_ns);
+        for _ in 0..periods.min(MAX_SKIPPED) {
             self.advance();
+            self.start_ns += self.period_ns;
         }
         self.wait_for(next_period_ns);
         Ok(())

@@ -1,5 +1,5 @@
 //! Tests of the link to the controller: it discards commands for another arm without an error, and in virtual time it waits for a
-//! controller as long as its process exists.
+//! controller for up to a minute, unless it has left.
 
 use core::time::Duration;
 use supple_core::{Controller, State, step};

@@ -258,7 +258,16 @@ fn there_and_back(amplitude_rad: f64) -> Fourier<4> {
 /// In one direction, dry friction is not told apart from an offset: the learner requests nothing before a joint has moved back.
 #[test]
 fn an_estimate_waits_for_both_directions() {
-    let config = model(four());
+    for presliding_rad in [0.0, 1e-3, 4e-3] {
+        let mut config = model(four());
+        for friction in &mut config.friction {
+            friction.presliding_rad = presliding_rad;
+        }
+        waits_for_both_directions(config);
+    }
+}
+
+fn waits_for_both_directions(config: Config<4>) {
     let truth = Truth {
         coulomb: Vector::repeat(0.2),
         ..Truth::none()
