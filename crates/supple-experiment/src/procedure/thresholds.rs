@@ -25,6 +25,8 @@ const GRAVITY_ERROR_SHARE: f64 = 1.1;
 const FRICTION_ERROR_RATIO: f64 = 2.0;
 /// `plausible.stiction_factor` before the first fit: friction may be twice that of the model, and grows with the load besides.
 const STICTION_FACTOR: f64 = 3.0;
+/// The same with the model of the first fit, which knows friction that grows with the load from short motions only.
+const FIRST_FIT_STICTION_FACTOR: f64 = 2.0;
 /// Error by inertia and other terms \[N m\].
 const MARGIN_NM: f64 = 1.0;
 /// Maximum threshold as a fraction of the joint's torque limit.
@@ -72,6 +74,7 @@ pub fn minimum_thresholds<const N: usize>(
             return Ok(MinimumThresholds {
                 move_share: FIRST_FIT_MOVE_SHARE,
                 against_share: FIRST_FIT_AGAINST_SHARE,
+                stiction_factor: FIRST_FIT_STICTION_FACTOR,
                 ..minimum
             });
         }
