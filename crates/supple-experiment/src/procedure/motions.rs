@@ -238,34 +238,41 @@ fn scaled<const N: usize>(series: &Fourier<N>, by: f64, periods: f64) -> Fourier
 pub struct ViaPose<const N: usize> {
     /// The model.
     pub config: Config<N>,
-    /// The via pose, in which gravity needs little torque.
-    pub light_rad: Vector<N>,
+    /// The candidates: a pose in which gravity needs little torque, and home.
+    pub via_rad: [Vector<N>; 2],
 }
 
 impl<const N: usize> ViaPose<N> {
-    /// Returns the greatest share of a torque limit that gravity and dry friction need along a line.
+    /// Returns the greatest share of a torque limit that gravity and dry friction under its load need along a line.
     fn share_along(&self, from_rad: &Vector<N>, to_rad: &Vector<N>) -> f64 {
         let config = &self.config;
-        let dry_nm = Vector::from_fn(|j, _| config.friction[j].breakaway_nm);
         let at = |i: usize| {
             let q = from_rad + (to_rad - from_rad) * (i as f64 / LINE_POSES as f64);
-            share(config, &(gravity(&config.arm, &q).abs() + dry_nm))
+            let load_nm = gravity(&config.arm, &q);
+            let dry_nm =
+                Vector::from_fn(|j, _| config.friction[j].at_load(load_nm[j]).dry_size_nm(0.0));
+            share(config, &(load_nm.abs() + dry_nm))
         };
         (0..=LINE_POSES).map(at).fold(0.0, f64::max)
     }
 
     fn moves(&self, from_rad: &Vector<N>, to_rad: &Vector<N>) -> Vec<Step<N>> {
+        let direct = vec![move_to(&self.config, to_rad, from_rad)];
         let straight = self.share_along(from_rad, to_rad);
-        let light_rad = &self.light_rad;
-        let around = self.share_along(from_rad, light_rad);
-        let around = around.max(self.share_along(light_rad, to_rad));
-        if straight <= TORQUE_SHARE || straight <= around {
-            return vec![move_to(&self.config, to_rad, from_rad)];
+        if straight <= TORQUE_SHARE {
+            return direct;
         }
-        vec![
-            move_to(&self.config, light_rad, from_rad),
-            move_to(&self.config, to_rad, light_rad),
-        ]
+        let around = self.via_rad.iter().map(|via_rad| {
+            let first = self.share_along(from_rad, via_rad);
+            (first.max(self.share_along(via_rad, to_rad)), via_rad)
+        });
+        match around.min_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((share, via_rad)) if share < straight => vec![
+                move_to(&self.config, via_rad, from_rad),
+                move_to(&self.config, to_rad, via_rad),
+            ],
+            _ => direct,
+        }
     }
 }
 

@@ -28,7 +28,8 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             return Ok(None);
         };
         let config = config::<N>(&self.model(stage)?)?;
-        Ok(Some(ViaPose { config, light_rad }))
+        let via_rad = [light_rad, self.home_rad];
+        Ok(Some(ViaPose { config, via_rad }))
     }
 
     /// Designs the motions with the model of a stage.
