@@ -197,8 +197,12 @@ try:
     {call}
 except KeyboardInterrupt:
     print(time.process_time() - due_s)
-    threads = lambda: [(task / "comm").read_text().strip() for task in Path("/proc/self/task").iterdir()]
-    while "supple" in threads():
+    def name(thread):
+        try:
+            return (thread / "comm").read_text().strip()
+        except (FileNotFoundError, ProcessLookupError):
+            return "ended"
+    while "supple" in map(name, Path("/proc/self/task").iterdir()):
         time.sleep(0.01)
 """
 
