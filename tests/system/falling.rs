@@ -10,6 +10,23 @@ use supple_realtime::pause;
 /// Maximum number of cycles for laying the arm down.
 const LAID_DOWN_CYCLES: u64 = 6000;
 
+/// Time in which a declaration, before the shutdown, has arrived.
+const DECLARED: Duration = Duration::from_millis(100);
+/// Time for which an arm that nobody supports must be held at the end.
+const HELD: Duration = Duration::from_secs(4);
+
+/// A YAM in virtual time, in which a busy machine does not disable the motors.
+const IN_VIRTUAL_TIME: [&str; 8] = [
+    "--plant",
+    "emu",
+    "--arm",
+    "yam",
+    "--virtual-time",
+    "--for",
+    "3600",
+    "--no-log",
+];
+
 /// Reads the numbers of a column of a trace.
 fn column(trace: &Path, name: &str) -> Vec<f64> {
     let text = std::fs::read_to_string(trace).expect("a trace");
@@ -93,19 +110,7 @@ fn an_arm_without_brakes_tracks_and_is_laid_down_at_the_end_of_its_run() {
 
 #[test]
 fn a_signal_in_motion_lays_the_arm_down_before_its_motors_are_disabled() {
-    let mut up = Up::start(&[
-        "--plant",
-        "emu",
-        "--arm",
-        "yam",
-        "--virtual-time",
-        "--for",
-        "3600",
-        "--trace",
-        "trace.csv",
-        "--no-log",
-        "--json",
-    ]);
+    let mut up = Up::start(&[&IN_VIRTUAL_TIME[..], &["--trace", "trace.csv", "--json"]].concat());
     up.wait_until("tracking", |status| {
         status["mode"] == "track" && status["mode_time_s"].as_f64() > Some(2.0)
     });
@@ -120,16 +125,8 @@ fn a_signal_in_motion_lays_the_arm_down_before_its_motors_are_disabled() {
 /// Gravity hold does not end the laying down, and its error explains this; afterwards the arm can be enabled again.
 #[test]
 fn gravity_hold_is_refused_while_the_arm_is_laid_down() {
-    let how = [
-        "--plant",
-        "emu",
-        "--arm",
-        "yam",
-        "--no-log",
-        "--no-realtime",
-    ];
-    let up = Up::start(&how);
-    up.wait_until("active drives", |status| status["drives"] == "active");
+    let up = Up::start(&IN_VIRTUAL_TIME);
+    up.wait_until("tracking", |status| status["mode"] == "track");
     let idle = up.run(&["mode", "idle"]);
     assert!(idle.status.success(), "{}", stderr_of(&idle));
     up.wait_until("held", |status| status["drives"] == "held");
@@ -147,14 +144,17 @@ fn gravity_hold_is_refused_while_the_arm_is_laid_down() {
     up.wait_until("active drives", |status| status["drives"] == "active");
 }
 
-/// Writes a YAM whose motors wait 0.4 s for a command instead of 20 ms, so that a busy machine does not disable them.
-fn patient_yam(folder: &Path) {
+/// Writes a YAM whose motors wait 0.4 s for a command instead of 20 ms, so that a busy machine does not disable them; returns the
+/// path of its description.
+fn patient_yam(folder: &Path) -> String {
     let asset = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/yam");
     std::fs::copy(asset.join("arm.urdf"), folder.join("arm.urdf")).expect("it is written");
     let text = std::fs::read_to_string(asset.join("arm.toml")).expect("it is read");
     let patient = text.replace("watchdog_s = 0.02", "watchdog_s = 0.4");
     assert_ne!(patient, text);
-    std::fs::write(folder.join("arm.toml"), patient).expect("it is written");
+    let path = folder.join("arm.toml");
+    std::fs::write(&path, patient).expect("it is written");
+    path.into_os_string().into_string().expect("UTF-8")
 }
 
 /// Expected: after the signal the arm is held, with its motors enabled, until `supple stop --supported`; then the system ends. A
@@ -162,23 +162,28 @@ fn patient_yam(folder: &Path) {
 #[test]
 fn an_arm_is_held_at_the_end_until_it_is_supported() {
     let folder = temporary_folder();
-    patient_yam(folder.path());
-    let arm = folder.path().join("arm.toml");
-    let mut up = Up::start(&[
+    let arm = patient_yam(folder.path());
+    let arguments = [
         "--plant",
         "emu",
         "--arm",
-        arm.to_str().expect("UTF-8"),
+        &arm,
         "--no-log",
         "--no-realtime",
         "--hold-until-supported",
         "--json",
-    ]);
+    ];
+    Up::again_after_a_stall(|| Up::start(&arguments), is_held_until_supported);
+}
+
+fn is_held_until_supported(up: &mut Up) {
     up.wait_until("active drives", |status| status["drives"] == "active");
     kill_process(up.child("supple-can"), Signal::USR1).expect("it runs");
-    pause(Duration::from_millis(100));
+    pause(DECLARED);
+    let status = up.wait_until("a status", |_| true);
+    assert_eq!(status["drives"], "active", "{status}");
     kill_process(up.process(), Signal::TERM).expect("it runs");
-    pause(Duration::from_secs(4));
+    pause(HELD);
     let supported = up.run(&["stop", "--supported"]);
     assert!(supported.status.success(), "{}", stderr_of(&supported));
     let output = up.ended();

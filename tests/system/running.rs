@@ -1,7 +1,7 @@
 //! Runs `supple up` in the background in a temporary folder and collects its output.
 
 use crate::support::programs;
-use rustix::process::{Pid, Signal, kill_process};
+use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process, waitid};
 use serde_json::Value;
 use std::os::unix::fs::PermissionsExt;
 use std::os::unix::process::CommandExt;
@@ -88,27 +88,34 @@ impl Up {
         panic!("the system did not track: {last}");
     }
 
-    /// Runs a scenario with a system that tracks at its beginning. If a stall of the machine makes the drives idle, which ends tracking,
-    /// so that the scenario panics, runs it again with a new system, at most [`STARTS`] times.
+    /// Runs a scenario with a system that tracks at its beginning, as [`Up::again_after_a_stall`] does.
     pub fn while_tracking(arguments: &[&str], scenario: impl Fn(&mut Up)) {
+        Up::again_after_a_stall(|| Up::tracking(arguments), scenario);
+    }
+
+    /// Runs a scenario. If a stall of the machine makes the drives idle or latches a fault, so that the scenario panics, runs it again
+    /// with a new system, at most [`STARTS`] times.
+    pub fn again_after_a_stall(start: impl Fn() -> Up, scenario: impl Fn(&mut Up)) {
         for later in (0..STARTS).rev() {
-            let mut up = Up::tracking(arguments);
+            let mut up = start();
             let Err(panic) = catch_unwind(AssertUnwindSafe(|| scenario(&mut up))) else {
                 return;
             };
             if later == 0 || !up.has_stalled() {
                 resume_unwind(panic);
             }
-            eprintln!("the drives became idle: the scenario begins again");
+            eprintln!("the machine stalled: the scenario begins again");
         }
     }
 
-    /// Whether the system is active, its drives are idle, and answers were missed: this is so after a stall of the machine.
+    /// Whether answers were missed and the system is in a fault, or its drives are idle while the controller is active: this is so
+    /// after a stall of the machine.
     fn has_stalled(&self) -> bool {
         let output = self.run(&["status", "--json"]);
         let status: Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
         let missed = status["missed"].as_u64().unwrap_or(0);
-        status["drives"] == "idle" && status["mode"] == "gravity_hold" && missed > 0
+        let lost = status["drives"] == "idle" && status["mode"] == "gravity_hold";
+        (lost || status["mode"] == "fault") && missed > 0
     }
 
     pub fn run(&self, arguments: &[&str]) -> Output {
@@ -133,7 +140,13 @@ impl Up {
         Pid::from_raw(pid.parse().expect("a number")).expect("not zero")
     }
 
-    /// Polls the status until the condition holds; fails after many polls.
+    /// Whether `supple up` has ended.
+    fn has_ended(&self) -> bool {
+        let how = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
+        waitid(WaitId::Pid(self.process()), how).is_ok_and(|status| status.is_some())
+    }
+
+    /// Polls the status until the condition holds; fails after many polls, or if the system has ended.
     pub fn wait_until(&self, what: &str, condition: impl Fn(&Value) -> bool) -> Value {
         let mut last = String::new();
         for _ in 0..400 {
@@ -145,6 +158,8 @@ impl Up {
                     return status;
                 }
                 last = status.to_string();
+            } else if self.has_ended() {
+                panic!("{what} was not reached, the system has ended: {last}");
             }
         }
         panic!("{what} was not reached: {last}");
