@@ -4,9 +4,9 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 PLAIN=(fmt clippy test doctest doc)
-FULL=(deny advisories page package urdfs instructions fused edits cycles fuzz cortex-m)
-# Also of the full run: each computes on one processor or waits, so they run one after the other beside those above.
-BESIDE=(ur10e python impact services ros socketcan)
+FULL=(deny advisories page package urdfs edits fuzz)
+# Also of the full run: each mostly computes on one processor or waits, so they run one after the other beside those above.
+BESIDE=(ur10e python impact services ros socketcan instructions fused cycles cortex-m)
 CARGO_DENY_VERSION=0.20.2
 CARGO_FUZZ_VERSION=0.13.2
 GUNGRAUN_VERSION=0.20.0
