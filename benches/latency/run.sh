@@ -7,8 +7,8 @@
 #
 #     benches/latency/run.sh --system [--seconds N] [--rounds N]
 #
-# The second form runs complete systems, `supple up --plant sim` and `--plant emu`, alternating with cyclictest,
-# and rewrites SYSTEM.md. With real-time permission (root) all of them use SCHED_FIFO and locked memory,
+# The second form runs complete systems, `supple up` with a WAM (also with viewers), OpenArm and YAM, alternating with
+# cyclictest, and rewrites SYSTEM.md. With real-time permission (root) all of them use SCHED_FIFO and locked memory,
 # otherwise none does. --smoke: one round of two seconds; writes no files. Installs cyclictest from the system's
 # packages (as root).
 set -euo pipefail

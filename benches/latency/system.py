@@ -1,35 +1,62 @@
 """Alternates complete systems in wall-clock time with cyclictest and writes SYSTEM.md. `run.sh --system`
 calls it.
 
-For both, an overrun is a cycle that starts so late that its reply cannot arrive in time. A plant waits
+The systems: a simulated and an emulated WAM, the simulated one also with a page that a viewer reads and another viewer
+stalls, and the emulated arms without brakes, each at its default rate. For all, an overrun is a cycle that starts so late that its reply cannot arrive in time. A plant waits
 for the reply until three quarters of the period have passed; a reply takes some 50 us.
 """
 
 import argparse
+import contextlib
 import json
 import os
 import pathlib
 import statistics
 import subprocess
 import tempfile
+import time
 
 import run
+import viewers
 
 HERE = pathlib.Path(__file__).parent
 OVERRUN_US = 700
 TARGET_PERCENT = 0.1
+PREFIX = "latency"
+VIEWED = "wam4 sim, viewers"
+# Plant and arm of each system.
+SYSTEMS = {
+    "wam4 sim": ("sim", "wam4"),
+    VIEWED: ("sim", "wam4"),
+    "wam4 emu": ("emu", "wam4"),
+    "openarm emu": ("emu", "openarm"),
+    "yam emu": ("emu", "yam"),
+}
+# A change of p99.9 beyond this share would show that viewers delay the loop.
+VIEWERS_PERCENT = 5
+STARTED_S = 2
 
 
-def up(arguments, plant):
-    """Runs `supple up` and returns its summary."""
+def up(arguments, name):
+    """Runs `supple up` and returns its summary, also that of a run that a fault ends."""
+    plant, arm = SYSTEMS[name]
+    programs = arguments.programs.resolve()
     with tempfile.TemporaryDirectory() as folder:
         environment = dict(os.environ, XDG_RUNTIME_DIR=folder)
-        command = [arguments.programs.resolve() / "supple", "up", "--plant", plant, "--json"]
-        command += ["--for", str(arguments.seconds), "--prefix", "latency"]
-        ended = subprocess.run(
-            command, cwd=folder, env=environment, check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        command = [programs / "supple", "up", "--plant", plant, "--arm", arm, "--json"]
+        command += ["--for", str(arguments.seconds), "--prefix", PREFIX]
+        system = subprocess.Popen(
+            command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
         )
-    return json.loads(ended.stdout)
+        # Its messages are few: they fit into the pipe.
+        time.sleep(STARTED_S)
+        watching = viewers.watching(programs, PREFIX, environment) if name == VIEWED else contextlib.nullcontext({})
+        with watching as counts:
+            time.sleep(max(0, arguments.seconds - 2 * STARTED_S))
+        output, messages = system.communicate()
+    if not output:
+        raise ChildProcessError(f"{name}: {messages}")
+    return {**json.loads(output), "viewers": counts}
 
 
 def cyclictest(arguments, realtime):
@@ -49,38 +76,61 @@ def cyclictest(arguments, realtime):
 
 
 def share(part, whole):
-    return 100 * part / whole
+    return 100 * part / whole if whole else 0.0
+
+
+def comparison(rounds):
+    """p99.9 of the wake-up and of the step with viewers, as a share of the run without them in the same round."""
+    for key, unit in (("wake_us", "wake-up"), ("step_ns", "step")):
+        shares = [share(r[VIEWED][key]["p999"], r["wam4 sim"][key]["p999"]) - 100 for r in rounds]
+        within = abs(statistics.median(shares)) <= VIEWERS_PERCENT
+        yield (
+            f"- p99.9 of the {unit} with viewers: median {statistics.median(shares):+.1f} %, from {min(shares):+.1f} to "
+            f"{max(shares):+.1f} % of the run without them in the same round; target {VIEWERS_PERCENT} %: "
+            f"{'met' if within else '**not met**'}"
+        )
 
 
 def lines(machine, rounds, seconds):
     text = ["# Complete systems in wall-clock time", ""]
     text += [
         f"Written by `benches/latency/run.sh --system`; do not edit. {len(rounds)} rounds of {seconds} s each for",
-        "`supple up --plant sim`, `--plant emu` and cyclictest, alternating, all at 1 kHz, none bound to a CPU.",
-        f"An overrun of cyclictest is a wake-up later than {OVERRUN_US} us, which leaves no time for a reply;",
-        f"the target is {TARGET_PERCENT} % of missed cycles, or at most twice cyclictest's overruns of the same round.",
+        "`supple up` with the WAM (`--plant sim`, `--plant emu`; 1 kHz), OpenArm (7 motors, CAN FD, 1 kHz) and YAM (6 motors, CAN,",
+        "400 Hz), and for cyclictest at 1 kHz, alternating, none bound to a CPU. With viewers: `supple view` beside it, one viewer that",
+        "reads all channels and one that reads nothing. An overrun of cyclictest is a wake-up later than",
+        f"{OVERRUN_US} us, which leaves no time for a reply; the target is {TARGET_PERCENT} % of missed cycles, or at most twice",
+        "cyclictest's overruns of the same round. A fault ends a run: its figures are those until then.",
         "",
     ]
     text += [f"- {key}: {value}" for key, value in machine.items()]
-    text += ["", "| round | cyclictest overruns % | max us | plant | missed % | tx_lost | clock stall ms | step p99 us |"]
-    text += ["|---|---|---|---|---|---|---|---|"]
+    text += [
+        "",
+        "| round | cyclictest overruns % | max us | system | missed % | tx_lost | clock stall ms | wake-up p99.9 us | round trip p50, p99.9 us "
+        "| step p99, p99.9 us | faults |",
+        "|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
     for number, beside in enumerate(rounds, 1):
         bare = beside["cyclictest"]
-        for plant in ("sim", "emu"):
-            s = beside[plant]
+        for name in SYSTEMS:
+            s = beside[name]
+            trip, step = s["round_trip_us"], s["step_ns"]
             text.append(
-                f"| {number} | {share(bare['overruns'], bare['cycles']):.3f} | {bare['max_us']} | {plant} "
+                f"| {number} | {share(bare['overruns'], bare['cycles']):.3f} | {bare['max_us']} | {name} "
                 f"| {share(s['missed'], s['cycles']):.3f} | {s['tx_lost']} | {s['clock_stall_ms']:.1f} "
-                f"| {s['step_ns']['p99'] / 1e3:.1f} |"
+                f"| {s['wake_us']['p999']:.0f} | {trip['p50']:.0f}, {trip['p999']:.0f} "
+                f"| {step['p99'] / 1e3:.1f}, {step['p999'] / 1e3:.1f} | {'; '.join(s['faults']) or 'none'} |"
             )
     text += [""]
     bare = statistics.median(share(r["cyclictest"]["overruns"], r["cyclictest"]["cycles"]) for r in rounds)
-    for plant in ("sim", "emu"):
-        missed = statistics.median(share(r[plant]["missed"], r[plant]["cycles"]) for r in rounds)
+    for name in SYSTEMS:
+        shares = [share(r[name]["missed"], r[name]["cycles"]) for r in rounds]
+        missed = statistics.median(shares)
         met = missed <= max(TARGET_PERCENT, 2 * bare)
         text.append(
-            f"- `{plant}`: median {missed:.3f} % missed, {bare:.3f} % overruns of cyclictest: {'met' if met else '**not met**'}"
+            f"- `{name}`: median {missed:.3f} % missed (to {max(shares):.3f} %), {bare:.3f} % overruns of cyclictest: "
+            f"{'met' if met else '**not met**'}"
         )
+    text += comparison(rounds)
     return text
 
 
@@ -93,14 +143,11 @@ def main():
     realtime = run.realtime_is_granted()
     rounds = []
     for number in range(arguments.rounds):
-        rounds.append(
-            {
-                "sim": up(arguments, "sim"),
-                "cyclictest": cyclictest(arguments, realtime),
-                "emu": up(arguments, "emu"),
-            }
-        )
-        print(f"{number + 1}/{arguments.rounds}: {rounds[-1]}", flush=True)
+        # Every second round in the opposite order.
+        order = [*SYSTEMS, "cyclictest"][:: (-1) ** number]
+        results = {name: cyclictest(arguments, realtime) if name == "cyclictest" else up(arguments, name) for name in order}
+        rounds.append(results)
+        print(f"{number + 1}/{arguments.rounds}: {results}", flush=True)
     machine = {
         "processor": f"{run.processor()}, {os.cpu_count()} cores",
         "scheduling": "SCHED_FIFO, memory locked" if realtime else "SCHED_OTHER",
