@@ -169,10 +169,14 @@ impl HandState {
         }
     }
 
-    /// Sets the mode of the controller from this time on, which decides whether the hand holds the tip.
+    /// Sets the mode of the controller from this time on, which decides whether the hand holds the tip. In a cycle without an answer
+    /// of the controller, a hand that holds the tip keeps hold of it.
     pub fn set_controller_view(&mut self, view: ControllerView, time_s: f64) {
         let holds = match self.hand.when {
-            Grip::Float => view.active && view.mode == Some(Mode::Float),
+            Grip::Float => match view.mode {
+                Some(mode) => view.active && mode == Mode::Float,
+                None => self.since_s.is_some(),
+            },
             Grip::Active => view.active || self.since_s.is_some(),
         };
         match (holds, self.since_s) {
@@ -280,6 +284,12 @@ mod tests {
         assert_eq!(force_n.norm().min(50.0), force_n.norm());
         let held_n = state.force_n(13.9, &tip_m, &rest).norm();
         assert!((held_n - 50.0).abs() < 1e-9, "{held_n}");
+        let unanswered = ControllerView {
+            active: true,
+            mode: None,
+        };
+        state.set_controller_view(unanswered, 13.9);
+        assert!((state.force_n(13.9, &tip_m, &rest).norm() - 50.0).abs() < 1e-9);
         state.set_controller_view(seen(true, Mode::Fault), 14.0);
         assert_eq!(state.force_n(14.0, &tip_m, &rest), rest);
     }

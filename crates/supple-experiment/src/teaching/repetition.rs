@@ -9,8 +9,10 @@ use supple_core::{Controller, Reference, Trajectory, Vector};
 
 /// Time between two set-points at the speed of the motion \[s\].
 const SPACING_S: f64 = 0.04;
-/// Half of the time over which the motion is smoothed \[s\].
-const HALF_S: f64 = 0.06;
+/// `sigma` of the kernel that smooths the motion \[s\].
+const SIGMA_S: f64 = 0.1;
+/// Time by which the smoothed motion begins before and ends after the recorded one \[s\]; further away it rests.
+const TAIL_S: f64 = 3.0 * SIGMA_S;
 /// Factor by which each attempt slows down a motion that exceeds a limit.
 const SLOWER: f64 = 1.1;
 /// Maximum time between two set-points, which determines the slowest repetition \[s\].
@@ -75,10 +77,10 @@ impl<const N: usize> Repetition<N> {
         let (Some(begin_s), Some(tip_m)) = (recorded.time_s.first(), recorded.tip_m.first()) else {
             return Err(RepetitionError::NoMotion);
         };
-        // The smoothing window extends beyond both ends of the motion.
-        let length_s = recorded.duration_s() + 2.0 * HALF_S;
+        let length_s = recorded.duration_s() + 2.0 * TAIL_S;
         let intervals = (length_s / SPACING_S).ceil() as usize;
-        let at = |k: usize| reference_at(recorded, begin_s - HALF_S + SPACING_S * k as f64, HALF_S);
+        let at =
+            |k: usize| reference_at(recorded, begin_s - TAIL_S + SPACING_S * k as f64, SIGMA_S);
         let mut points: Vec<Reference> = (0..=intervals).map(at).collect();
         for end in [0, intervals] {
             points[end] = Reference::at_rest(points[end].position);
@@ -113,7 +115,7 @@ impl<const N: usize> Repetition<N> {
             );
             if !slowing_may_help || next as f64 * config.period_s > MAX_SPACING_S {
                 return Err(RepetitionError::Refused {
-                    time_s: (time_s / slowdown - HALF_S).max(0.0),
+                    time_s: (time_s / slowdown - TAIL_S).max(0.0),
                     refusal,
                 });
             }
@@ -198,7 +200,7 @@ impl<const N: usize> Repetition<N> {
     /// Returns the time in the recorded motion, from its first sample, that is repeated in this cycle \[s\].
     pub fn recorded_time_s(&self, start_cycle: u64, cycle: u64) -> f64 {
         let cycles = cycle.saturating_sub(start_cycle) as f64;
-        SPACING_S * cycles / self.spacing_cycles as f64 - HALF_S
+        SPACING_S * cycles / self.spacing_cycles as f64 - TAIL_S
     }
 }
 

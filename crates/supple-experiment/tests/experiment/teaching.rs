@@ -1,7 +1,7 @@
 //! A motion that is taught by guiding the floating arm by hand is recorded, written, read, planned, and repeated as
 //! set-points, as by `supple teach` and `supple play`, in virtual time.
 
-use supple_core::controller::{Mode, Request, check_motion};
+use supple_core::controller::{LearningSwitch, Mode, Request, check_motion};
 use supple_core::math::Vector3;
 use supple_core::{Controller, Vector};
 use supple_experiment::metrics::Rms;
@@ -15,6 +15,8 @@ use supple_plant::{Hand, Scene};
 const N: usize = 4;
 /// Length of the motion \[s\].
 const SHOWN_S: f64 = 20.0;
+/// Bound on the error of a repetition after one with learning \[m\].
+const LEARNED_M: f64 = 6.5e-3;
 /// Cycles of gravity hold at the start.
 const SETTLE: u64 = 200;
 
@@ -142,19 +144,40 @@ impl Arm {
     }
 }
 
-/// The expectation before the first run was 5 mm RMS in all cases. The error is 3.75 mm at 25 N/m with the exact model, and 2.0
-/// mm at 100 N/m with the errors of an identified model. At 5 N/m dry friction at rests and reversals causes 9.9 and 19.6 mm, at
-/// 25 N/m with the identified model 5.4 mm; the bounds are chosen for these values.
+/// A model as good as an identification is learned in one repetition. Expected: 5 mm RMS in the next one; found:
+/// 2.6, 2.6 and 5.5 mm.
+#[test]
+fn after_one_repetition_with_learning_a_taught_motion_is_repeated() {
+    for seed in 0..3 {
+        let mut arm = Arm::new(Some(Mismatch::identified(seed)), 5.0);
+        arm.rig = arm.rig.with_learner();
+        arm.cycle(Some(Request::Learning(LearningSwitch::On)));
+        let shown = arm.teach();
+        let repetition = Repetition::plan(&arm.controller, &shown, 1.0).expect("possible");
+        let (first, _) = arm.play(&shown, &repetition);
+        let (second, _) = arm.play(&shown, &repetition);
+        println!(
+            "identified, seed {seed}, at 5 N/m, learning: RMS {:.2}, then {:.2} mm",
+            1e3 * first.rms(),
+            1e3 * second.rms()
+        );
+        assert!(second.rms() < LEARNED_M, "{} m", second.rms());
+    }
+}
+
+/// The expectation before the first run was 5 mm RMS in all cases. At 5 N/m the error is 4.6 mm with the exact model and 13.5 mm with
+/// the errors of an identified one; at 25 N/m 1.5 and 3.2 mm, at 100 N/m 0.9 mm with the latter. The bounds are chosen for these
+/// values.
 #[test]
 fn a_taught_motion_of_twenty_seconds_is_repeated() {
     let folder = tempfile::tempdir().expect("a folder");
     let identified = Some(Mismatch::identified(0));
     for (model, mismatch, stiffness_n_per_m, expected_m) in [
-        ("exact", None, 5.0, 12e-3),
-        ("identified", identified, 5.0, 22e-3),
-        ("exact", None, 25.0, 5e-3),
-        ("identified", identified, 25.0, 6.5e-3),
-        ("identified", identified, 100.0, 3e-3),
+        ("exact", None, 5.0, 6e-3),
+        ("identified", identified, 5.0, 16e-3),
+        ("exact", None, 25.0, 2.2e-3),
+        ("identified", identified, 25.0, 4.5e-3),
+        ("identified", identified, 100.0, 1.5e-3),
     ] {
         let name = format!("{model} at {stiffness_n_per_m} N/m");
         let mut arm = Arm::new(mismatch, stiffness_n_per_m);

@@ -98,11 +98,11 @@ fn a_joint_that_sticks_and_slips_has_an_interval_without_a_residual() {
             source: "a test",
         });
         let described = described.expect("an arm");
-        let law =
-            format!("friction_velocity = \"reference\"\nmeasured_stribeck = {measured_stribeck}");
+        let law = |on: bool| format!("measured_stribeck = {on}");
+        assert!(described.toml().contains(&law(true)));
         let text = described
             .toml()
-            .replace("friction_velocity = \"reference\"", &law);
+            .replace(&law(true), &law(measured_stribeck));
         let described = Description::from_text(&text, described.urdf()).expect("an arm");
         let region = SinusoidRegion::<4>::new(&described).expect("four joints");
         region.expect("within reach")
