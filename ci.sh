@@ -327,8 +327,12 @@ gungraun_runner() {
 # Builds a tool under target/tools; unoptimised and without debug information, which takes half the time and serves as well.
 install_tool() {
     local root=target/tools
-    CARGO_PROFILE_DEV_DEBUG=0 CARGO_PROFILE_DEV_OPT_LEVEL=0 cargo install --quiet --locked --debug --root $root --target-dir $root/build "$1" >&2 || return 1
-    rm -rf $root/build
+    # One at a time: a step beside this one may install, too.
+    (
+        flock 9
+        CARGO_PROFILE_DEV_DEBUG=0 CARGO_PROFILE_DEV_OPT_LEVEL=0 cargo install --quiet --locked --debug --root $root --target-dir $root/build "$1" >&2 || exit 1
+        rm -rf $root/build
+    ) 9>"$WORK/tools.lock"
 }
 
 # Installs a package for a missing command.
@@ -441,6 +445,8 @@ main() {
         ;;
     full)
         mkdir -p "$WORK"
+        # A step that does not get to its end has no result, which the summary does not accept.
+        (cd "$RESULTS" 2>/dev/null && rm -f "${FULL[@]}" "${BESIDE[@]}") || true
         run_all "${BESIDE[@]}" >"$WORK/beside.log" 2>&1 &
         local beside=$!
         run_all "${FULL[@]}"

@@ -15,6 +15,8 @@ TOPICS = ["/controller_state", "/joint_states", "/tf", "/cycle_timing", "/view"]
 DESCRIPTIONS = 1000
 TIMEOUT_S = 30
 POLL_MS = 200
+# A connection that takes nothing for this long is full.
+STALLED_S = 2
 
 
 def connect(url):
@@ -66,38 +68,47 @@ def subscribe(connection, known, topics):
     send(connection, {"op": "subscribe", "subscriptions": wanted})
 
 
-def read_all(received, counts):
-    """Reads until the connection is closed."""
-    with contextlib.suppress(OSError, IndexError, ValueError):
+def read_all(received, counts, problems, ended):
+    """Reads until the benchmark closes the connection."""
+    try:
         while True:
             read_message(received)
             counts["messages read"] += 1
+    except (OSError, IndexError, ValueError) as error:
+        if not ended.is_set():
+            problems.append(f"the viewer that reads: {error!r}")
 
 
-def read_nothing(url, counts, ended):
+def read_nothing(url, counts, problems, ended):
     """Fills connections that are not read, one after the other, since the server drops each in the end."""
-    while not ended.is_set():
-        connection, received = connect(url)
-        with connection:
-            # `sendall` ends with a timeout once the connection is full in both directions.
-            with contextlib.suppress(OSError):
+    try:
+        while not ended.is_set():
+            connection, received = connect(url)
+            with connection:
                 known = channels(received)
-                subscribe(connection, known, TOPICS)
-                for _ in range(DESCRIPTIONS):
-                    subscribe(connection, known, ["/robot_description"])
-            counts["stalled connections"] += 1
-            states = select.poll()
-            states.register(connection, select.POLLRDHUP)
-            while not ended.is_set() and not states.poll(POLL_MS):
-                pass
+                connection.settimeout(STALLED_S)
+                # The server reads on while the viewer does not: requests are refused or wait, or the server drops the viewer.
+                with contextlib.suppress(TimeoutError, BrokenPipeError, ConnectionResetError):
+                    subscribe(connection, known, TOPICS)
+                    for _ in range(DESCRIPTIONS):
+                        subscribe(connection, known, ["/robot_description"])
+                counts["stalled connections"] += 1
+                states = select.poll()
+                states.register(connection, select.POLLRDHUP)
+                while not ended.is_set() and not states.poll(POLL_MS):
+                    pass
+    except (OSError, IndexError, KeyError, ValueError) as error:
+        if not ended.is_set():
+            problems.append(f"the viewer that stalls: {error!r}")
 
 
 @contextlib.contextmanager
 def watching(programs, prefix, environment):
-    """Runs `supple view` with both viewers; gives the counts of what they did."""
+    """Runs `supple view` with both viewers; gives the counts of what they did and a list of problems, which a viewer has if
+    the system ends before it."""
     command = [programs / "supple", "view", "--json", "--prefix", prefix]
     view = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-    counts = {"messages read": 0, "stalled connections": 0}
+    counts, problems = {"messages read": 0, "stalled connections": 0}, []
     ended = threading.Event()
     try:
         text = ""
@@ -111,15 +122,16 @@ def watching(programs, prefix, environment):
         with connection:
             subscribe(connection, channels(received), TOPICS)
             connection.settimeout(None)
-            reading = threading.Thread(target=read_all, args=(received, counts))
-            stalling = threading.Thread(target=read_nothing, args=(url, counts, ended))
+            reading = threading.Thread(target=read_all, args=(received, counts, problems, ended), daemon=True)
+            stalling = threading.Thread(target=read_nothing, args=(url, counts, problems, ended), daemon=True)
             reading.start()
             stalling.start()
-            yield counts
+            yield counts, problems
             ended.set()
-            stalling.join()
-            connection.shutdown(socket.SHUT_RDWR)
-            reading.join()
+            stalling.join(TIMEOUT_S)
+            with contextlib.suppress(OSError):
+                connection.shutdown(socket.SHUT_RDWR)
+            reading.join(TIMEOUT_S)
     finally:
         ended.set()
         view.terminate()
