@@ -104,18 +104,20 @@ impl Up {
             if later == 0 || !up.has_stalled() {
                 resume_unwind(panic);
             }
-            eprintln!("the machine stalled: the scenario begins again");
+            eprintln!("the machine stalled: the scenario begins again after this failure");
         }
     }
 
-    /// Whether answers were missed and the system is in a fault, or its drives are idle while the controller is active: this is so
-    /// after a stall of the machine.
+    /// Whether answers were missed, and the drives are idle while the controller is active, or a fault is latched that missed answers
+    /// cause: this is so after a stall of the machine.
     fn has_stalled(&self) -> bool {
         let output = self.run(&["status", "--json"]);
         let status: Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
         let missed = status["missed"].as_u64().unwrap_or(0);
         let lost = status["drives"] == "idle" && status["mode"] == "gravity_hold";
-        (lost || status["mode"] == "fault") && missed > 0
+        let fault = status["fault"].as_str().unwrap_or_default();
+        let late = ["no new arm state", "no encoder reply"];
+        (lost || late.iter().any(|words| fault.contains(words))) && missed > 0
     }
 
     pub fn run(&self, arguments: &[&str]) -> Output {

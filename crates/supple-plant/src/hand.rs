@@ -170,12 +170,12 @@ impl HandState {
     }
 
     /// Sets the mode of the controller from this time on, which decides whether the hand holds the tip. In a cycle without an answer
-    /// of the controller, a hand that holds the tip keeps hold of it.
+    /// of the controller, a hand that holds the tip keeps hold of it, until the drives are idle.
     pub fn set_controller_view(&mut self, view: ControllerView, time_s: f64) {
         let holds = match self.hand.when {
             Grip::Float => match view.mode {
                 Some(mode) => view.active && mode == Mode::Float,
-                None => self.since_s.is_some(),
+                None => view.active && self.since_s.is_some(),
             },
             Grip::Active => view.active || self.since_s.is_some(),
         };
@@ -290,6 +290,13 @@ mod tests {
         };
         state.set_controller_view(unanswered, 13.9);
         assert!((state.force_n(13.9, &tip_m, &rest).norm() - 50.0).abs() < 1e-9);
+        let idle = ControllerView {
+            active: false,
+            ..unanswered
+        };
+        let mut left = state.clone();
+        left.set_controller_view(idle, 13.9);
+        assert_eq!(left.force_n(13.9, &tip_m, &rest), rest);
         state.set_controller_view(seen(true, Mode::Fault), 14.0);
         assert_eq!(state.force_n(14.0, &tip_m, &rest), rest);
     }

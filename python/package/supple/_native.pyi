@@ -534,7 +534,7 @@ class Arm:
             or at ``qd``. Default: none.
         stribeck_velocity : array_like, (..., N), optional
             Joint velocities for the Stribeck effect of active joints (rad/s), with ``friction="reference"``: the controller
-            of an arm whose description has ``measured_stribeck`` (the built-in ones) uses the measured ones, averaged over 50 ms.
+            of an arm whose description has ``measured_stribeck`` (all but paper3) uses the measured ones, averaged over 50 ms.
             Default: as the rest of the friction.
         active_joints : sequence of bool, (N,), optional
             Joints on which the law acts; at least ``d``. The others get ``G + C qd``, friction and the coupling torque.

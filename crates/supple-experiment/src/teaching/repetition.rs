@@ -11,7 +11,7 @@ use supple_core::{Controller, Reference, Trajectory, Vector};
 const SPACING_S: f64 = 0.04;
 /// `sigma` of the kernel that smooths the motion \[s\].
 const SIGMA_S: f64 = 0.1;
-/// Time by which the smoothed motion begins before and ends after the recorded one \[s\]; further away it rests.
+/// Time by which the smoothed motion begins before and ends after the recorded one \[s\]; further away it nearly rests.
 const TAIL_S: f64 = 3.0 * SIGMA_S;
 /// Factor by which each attempt slows down a motion that exceeds a limit.
 const SLOWER: f64 = 1.1;

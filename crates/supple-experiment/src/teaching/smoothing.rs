@@ -77,7 +77,7 @@ mod tests {
         }
     }
 
-    /// Expected of the kernel: the factor (1 + x) exp(-x) with x = (2 pi f sigma)^2 / 2, 0.98 at 1 Hz and 1e-5 at 9 Hz.
+    /// Expected of the kernel: the factor (1 + x) exp(-x) with x = (2 pi f sigma)^2 / 2, 0.98 at 1 Hz and 2e-6 at 9 Hz.
     #[test]
     fn the_motion_of_a_hand_remains_and_an_oscillation_does_not() {
         for (frequency_hz, least, most) in [(1.0, 0.97, 0.99), (9.0, 0.0, 1e-3)] {
