@@ -1,9 +1,10 @@
 """Alternates complete systems in wall-clock time with cyclictest and writes SYSTEM.md. `run.sh --system`
 calls it.
 
-The systems: a simulated and an emulated WAM, the simulated one also with a page that a viewer reads and another viewer
-stalls, and the emulated arms without brakes, each at its default rate. For all, an overrun is a cycle that starts so late that its reply cannot arrive in time. A plant waits
-for the reply until three quarters of the period have passed; a reply takes some 50 us.
+The systems: a simulated and an emulated WAM, the simulated one also with a page that one viewer reads and another
+blocks, and the emulated arms without brakes, each at its default rate. For all, an overrun is a cycle that starts so
+late that its reply cannot arrive in time. A plant waits for the reply until three quarters of the period have passed;
+a reply takes some 50 us.
 """
 
 import argparse

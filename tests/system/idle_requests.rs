@@ -16,7 +16,7 @@ use tempfile::TempDir;
 /// Maximum number of cycles until idle is accepted, at 1 kHz.
 const IDLE_WITHIN_CYCLES: u64 = 20;
 /// Number of attempts: a blocked process fails all of them, a busy machine does not.
-const ATTEMPTS: u32 = 10;
+const ATTEMPTS: u32 = 5;
 const TIMEOUT: Duration = Duration::from_secs(30);
 
 /// A system in the background whose standard error is not read.
