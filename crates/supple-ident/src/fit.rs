@@ -41,6 +41,14 @@ const LOAD_PASSES: usize = 4;
 /// Weight of the prior of an effect: the square root of the number of samples that it counts for. Errors of the model are
 /// correlated over many samples.
 const EFFECT_PRIOR_WEIGHT: f64 = 50.0;
+/// Offset of a joint without a cost, in proportion to its Coulomb friction: differences of friction by direction and small currents of
+/// amplifiers are as large. Gravity and springs can nearly cancel a greater one in a motion, and not elsewhere.
+const OFFSET_FREE_SHARE: f64 = 0.1;
+/// Ratio of the residuals of a joint with the cost and without it, from which the motion shows that the offset is greater: then it has no cost.
+const OFFSET_SHOWN: f64 = 1.5;
+/// Share of the Coulomb friction, and of the root mean square torque, in the prior standard deviation of what is beyond.
+const OFFSET_DRY_SHARE: f64 = 0.4;
+const OFFSET_TORQUE_SHARE: f64 = 0.005;
 
 /// An identified model.
 #[derive(Clone, Debug)]
@@ -151,7 +159,7 @@ pub fn fit_rows<const N: usize>(
             format!("{rows}"),
         ));
     }
-    let (solution, blocks, noise, gap) = stage.solve(blocks)?;
+    let (solution, blocks, noise, gap) = stage.solve(&blocks)?;
     let stacked = weighted(&blocks, &noise, used.len());
     let base = BaseParameters::from_regressor(&stacked.a(), RANK_TOLERANCE)?;
     let freedom = (rows - base.rank().min(rows - 1)) as f64 * independent_fraction;
@@ -205,6 +213,8 @@ struct FitStage<'a> {
     links: Vec<nalgebra::SVector<f64, 10>>,
 }
 
+/// Previous solution, and the joints whose offsets have a cost.
+type Offsets<'a> = (&'a DVector<f64>, &'a [bool]);
 type StageSolution = (DVector<f64>, Vec<ReducedSystem>, Vec<f64>, Option<f64>);
 
 impl FitStage<'_> {
@@ -227,7 +237,42 @@ impl FitStage<'_> {
         (0..joints).map(of_joint).collect()
     }
 
-    fn solve(&self, mut blocks: Vec<ReducedSystem>) -> Result<StageSolution, IdentError> {
+    /// Solves with a cost of great offsets; without it for joints whose motion shows such an offset.
+    fn solve(&self, blocks: &[ReducedSystem]) -> Result<StageSolution, IdentError> {
+        let mut costs = vec![self.has_offset_costs(); blocks.len()];
+        loop {
+            let solution = self.reweighted(blocks.to_vec(), &costs)?;
+            if !costs.contains(&true) {
+                return Ok(solution);
+            }
+            let (x, blocks, noise, _) = &solution;
+            let without = self.step(blocks, noise, None)?.0;
+            let residuals = noise_nm(blocks, x)
+                .into_iter()
+                .zip(noise_nm(blocks, &without));
+            let mut changed = false;
+            for (cost, (with_nm, without_nm)) in costs.iter_mut().zip(residuals) {
+                let shown = *cost && with_nm > OFFSET_SHOWN * without_nm;
+                changed |= shown;
+                *cost &= !shown;
+            }
+            if !changed {
+                return Ok(solution);
+            }
+        }
+    }
+
+    fn has_offset_costs(&self) -> bool {
+        let offsets = self.columns.friction().offset;
+        offsets && self.options.consistent_prior_weight.is_some()
+    }
+
+    /// Solves with repeated weights. `offset_costs`: the joints whose offsets have a cost.
+    fn reweighted(
+        &self,
+        mut blocks: Vec<ReducedSystem>,
+        offset_costs: &[bool],
+    ) -> Result<StageSolution, IdentError> {
         let joints = blocks.len();
         let mut noise = match &self.options.weights {
             Weights::Equal => vec![1.0; joints],
@@ -240,7 +285,7 @@ impl FitStage<'_> {
                 weighted_least_squares(&blocks, &self.prior)?.1
             }
         };
-        let (mut x, mut gap) = self.step(&blocks, &noise)?;
+        let (mut x, mut gap) = self.step(&blocks, &noise, None)?;
         if matches!(
             self.options.weights,
             Weights::ByJointResidual | Weights::Huber
@@ -260,15 +305,17 @@ impl FitStage<'_> {
                 let change = next.iter().zip(&noise).map(|(a, b)| (a / b - 1.0).abs());
                 let settled = change.fold(0.0, f64::max) < 1e-3;
                 noise = next;
-                (x, gap) = self.step(&blocks, &noise)?;
+                (x, gap) = self.step(&blocks, &noise, Some((&x, offset_costs)))?;
                 if settled {
                     break;
                 }
             }
         }
-        if self.options.weights == Weights::Equal {
-            noise = equal_noise(&blocks, &x);
-            (x, gap) = self.step(&blocks, &noise)?;
+        if matches!(self.options.weights, Weights::Equal | Weights::Given(_)) {
+            if self.options.weights == Weights::Equal {
+                noise = equal_noise(&blocks, &x);
+            }
+            (x, gap) = self.step(&blocks, &noise, Some((&x, offset_costs)))?;
         }
         Ok((x, blocks, noise, gap))
     }
@@ -288,11 +335,40 @@ impl FitStage<'_> {
         (has_prior && matches!(column, Column::Load(_))).then_some((0.0, 0.1))
     }
 
-    /// Returns the rows of the prior of effects, friction by load and rotors.
-    fn effect_prior(&self) -> DMatrix<f64> {
+    /// Returns the prior mean and standard deviation of an offset that has a cost: from the previous solution, so that repeated
+    /// solutions have a cost only of what is beyond [`OFFSET_FREE_SHARE`].
+    fn offset_prior(
+        &self,
+        column: &Column,
+        blocks: &[ReducedSystem],
+        offsets: Option<Offsets>,
+    ) -> Option<(f64, f64)> {
+        let (Column::Offset(joint), Some((x, costs))) = (column, offsets) else {
+            return None;
+        };
+        let identified = self.columns.identified_joints();
+        let row = identified.iter().position(|j| j == joint)?;
+        if !costs[row] {
+            return None;
+        }
+        let coulomb = self.columns.position(Column::Coulomb(*joint))?;
+        let value = |column: usize| Some(x[self.used.binary_search(&column).ok()?]);
+        let coulomb_nm = value(coulomb)?.abs();
+        let free_nm = OFFSET_FREE_SHARE * coulomb_nm;
+        let mean_nm = value(self.columns.position(*column)?)?.clamp(-free_nm, free_nm);
+        let block = &blocks[row];
+        let torque_nm = (block.torque_squared() / block.rows() as f64).sqrt();
+        let deviation_nm = OFFSET_DRY_SHARE * coulomb_nm + OFFSET_TORQUE_SHARE * torque_nm;
+        (deviation_nm > 0.0).then_some((mean_nm, deviation_nm))
+    }
+
+    /// Returns the rows of the prior of effects, friction by load, rotors and `offsets`.
+    fn effect_prior(&self, blocks: &[ReducedSystem], offsets: Option<Offsets>) -> DMatrix<f64> {
         let known = self.used.iter().enumerate().filter_map(|(k, i)| {
             let column = &self.columns.list()[*i];
-            let prior = effect_prior(column).or_else(|| self.load_prior(column));
+            let prior = effect_prior(column)
+                .or_else(|| self.load_prior(column))
+                .or_else(|| self.offset_prior(column, blocks, offsets));
             let (mean, deviation) = prior.or_else(|| self.rotor_prior(k, column))?;
             Some((k, mean, EFFECT_PRIOR_WEIGHT / deviation))
         });
@@ -309,9 +385,10 @@ impl FitStage<'_> {
         &self,
         blocks: &[ReducedSystem],
         noise: &[f64],
+        offsets: Option<Offsets>,
     ) -> Result<(DVector<f64>, Option<f64>), IdentError> {
         let mut stacked = weighted(blocks, noise, self.used.len());
-        stacked.append(&self.effect_prior(), 0);
+        stacked.append(&self.effect_prior(blocks, offsets), 0);
         let Some(prior_weight) = self.options.consistent_prior_weight else {
             return Ok((nearest(&stacked, &self.prior)?, None));
         };

@@ -5,6 +5,7 @@
 Needs `pip install playwright` and Chromium (`CHROMIUM` names another program).
 """
 
+import json
 import os
 import re
 import subprocess
@@ -12,7 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Browser, Page, sync_playwright
 
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 READ = "id => document.getElementById(id).textContent"
@@ -76,24 +77,47 @@ def foreign(url: str, own: str, complaints: list[str]) -> None:
         complaints.append(f"request to {url}")
 
 
+def has_stalled(program: Path, prefix: str) -> bool:
+    """Whether answers were missed, and the drives are idle or a fault is latched for it, as after a stall of the machine."""
+    done = subprocess.run([program, "status", "--prefix", prefix, "--json"], capture_output=True, text=True, check=False)
+    status = json.loads(done.stdout) if done.stdout else {}
+    lost = status.get("drives") == "idle" and status.get("mode") == "gravity_hold"
+    late = any(words in (status.get("fault") or "") for words in ("no new arm state", "no encoder reply"))
+    return (status.get("missed") or 0) > 0 and (lost or late)
+
+
+def check_running(browser: Browser, program: Path, folder: Path, scheme: str, plant: str) -> None:
+    """Starts an arm and checks its page; begins again, at most four times, if the machine stalls: a page is drawn by all processors."""
+    prefix = f"page-{scheme}"
+    for later in reversed(range(5)):
+        with tempfile.TemporaryDirectory() as work:
+            command = [program, "up", "--plant", plant, "--view", "--no-realtime", "--prefix", prefix]
+            command += ["--block-m", "-0.3", "--log", Path(work) / "page.mcap"]
+            up = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+            context = browser.new_context(color_scheme=scheme, viewport={"width": 1280, "height": 900})
+            try:
+                lines = iter(up.stderr.readline, "")
+                url = next(found[0] for line in lines if (found := re.search(r"http://127\.0\.0\.1\S+", line)))
+                return check(context.new_page(), url, folder, scheme, plant)
+            except Exception as failure:
+                if later == 0 or not has_stalled(program, prefix):
+                    raise
+                print(f"the machine stalled, the check begins again after this failure: {failure}", flush=True)
+            finally:
+                context.close()
+                up.terminate()
+                up.communicate(timeout=60)
+    raise AssertionError("no attempt")
+
+
 def main() -> None:
     program, folder = Path(sys.argv[1]).resolve(), Path(sys.argv[2])
     folder.mkdir(parents=True, exist_ok=True)
     chromium = os.environ.get("CHROMIUM", "/usr/bin/chromium")
-    with sync_playwright() as playwright, tempfile.TemporaryDirectory() as work:
+    with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=FLAGS)
         for scheme, plant in (("light", "sim"), ("dark", "emu")):
-            command = [program, "up", "--plant", plant, "--view", "--no-realtime", "--prefix", f"page-{scheme}"]
-            command += ["--block-m", "-0.3", "--log", Path(work) / f"{scheme}.mcap"]
-            up = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-            try:
-                lines = iter(up.stderr.readline, "")
-                url = next(found[0] for line in lines if (found := re.search(r"http://127\.0\.0\.1\S+", line)))
-                context = browser.new_context(color_scheme=scheme, viewport={"width": 1280, "height": 900})
-                check(context.new_page(), url, folder, scheme, plant)
-            finally:
-                up.terminate()
-                up.communicate(timeout=60)
+            check_running(browser, program, folder, scheme, plant)
         browser.close()
     print(f"screenshots in {folder}")
 

@@ -1,7 +1,7 @@
 //! Random arms are identified from their motion and torques.
 
 use crate::property::config;
-use crate::support::{motion, random_arm};
+use crate::support::{motion, motion_of_size, random_arm};
 use proptest::prelude::*;
 use proptest::test_runner::TestCaseError;
 use supple_core::dynamics::{parameters, rnea};
@@ -283,6 +283,51 @@ fn a_stribeck_effect_that_the_motion_does_not_show_is_not_found() {
             assert!(friction.breakaway_nm <= 2.0 * friction.coulomb_nm);
         }
     }
+}
+
+/// Offsets up to a tenth of the Coulomb friction are found without a bias, greater ones where the motion shows them. In a motion of some
+/// degrees gravity and an offset nearly cancel: there the offset stays in proportion to the Coulomb friction.
+#[test]
+fn an_offset_is_not_made_up() {
+    let truth = random_arm::<3>(31);
+    let fitted = |size: f64, offset_nm: f64, noise_nm: f64, prior: Option<f64>, seed: u64| {
+        let friction = [Friction {
+            offset_nm,
+            ..Friction::coulomb(1.0, 1.0)
+        }; 3];
+        let mut data = motion_of_size(size, &truth, &friction, &[0, 1, 2], 3000, seed);
+        let mut noise = Random::new(seed);
+        data.tau
+            .iter_mut()
+            .for_each(|tau| *tau += noise_nm * noise.signed());
+        let options = Options {
+            consistent_prior_weight: prior,
+            slow_rad_per_s: 0.02,
+            ..Options::default()
+        };
+        let found = fit(&truth, &[data], &[0, 1, 2], &options).unwrap();
+        found
+            .friction()
+            .iter()
+            .map(|friction| friction.offset_nm)
+            .collect::<Vec<_>>()
+    };
+    for offset_nm in [-0.09, 0.0, 0.05] {
+        for found in fitted(1.0, offset_nm, 0.0, Some(1e-6), 4) {
+            assert!((found - offset_nm).abs() < 1e-4, "{found} of {offset_nm}");
+        }
+    }
+    for found in fitted(1.0, 0.5, 0.0, Some(1e-6), 4) {
+        assert!((found - 0.5).abs() < 0.01, "{found} of 0.5");
+    }
+    let largest = |prior: Option<f64>| {
+        (1..10)
+            .flat_map(|seed| fitted(0.1, 0.0, 0.5, prior, seed))
+            .fold(0.0_f64, |largest, found| largest.max(found.abs()))
+    };
+    let (free, with_cost) = (largest(None), largest(Some(1e-2)));
+    assert!(free > 0.5, "{free}");
+    assert!(with_cost < 0.2, "{with_cost}");
 }
 
 #[test]

@@ -39,12 +39,24 @@ pub fn motion<const N: usize>(
     samples: usize,
     seed: u64,
 ) -> Motion {
+    motion_of_size(1.0, truth, friction, moving, samples, seed)
+}
+
+/// Does the same with amplitudes of this multiple.
+pub fn motion_of_size<const N: usize>(
+    size: f64,
+    truth: &Arm<N>,
+    friction: &[Friction; N],
+    moving: &[usize],
+    samples: usize,
+    seed: u64,
+) -> Motion {
     let rate_hz = 50.0;
     let mut noise = Random::new(seed);
     let waves: Vec<[f64; 3]> = (0..5 * N)
         .map(|_| {
             [
-                0.4 * noise.signed(),
+                0.4 * size * noise.signed(),
                 2.0 + 1.7 * noise.signed(),
                 3.0 * noise.signed(),
             ]
