@@ -242,10 +242,15 @@ impl FitStage<'_> {
         let mut costs = vec![self.has_offset_costs(); blocks.len()];
         loop {
             let solution = self.reweighted(blocks.to_vec(), &costs)?;
-            if !costs.contains(&true) {
+            let (x, blocks, noise, _) = &solution;
+            let is_great = |(cost, joint): (&bool, &usize)| {
+                let offset = self.offset_and_coulomb_nm(*joint, x);
+                *cost && offset.is_some_and(|(o, s)| o.abs() > OFFSET_FREE_SHARE * s)
+            };
+            let joints = self.columns.identified_joints();
+            if !costs.iter().zip(joints).any(is_great) {
                 return Ok(solution);
             }
-            let (x, blocks, noise, _) = &solution;
             let without = self.step(blocks, noise, None)?.0;
             let residuals = noise_nm(blocks, x)
                 .into_iter()
@@ -335,6 +340,16 @@ impl FitStage<'_> {
         (has_prior && matches!(column, Column::Load(_))).then_some((0.0, 0.1))
     }
 
+    /// Returns a joint's offset and the magnitude of its Coulomb friction in `x`.
+    fn offset_and_coulomb_nm(&self, joint: usize, x: &DVector<f64>) -> Option<(f64, f64)> {
+        let value = |column| {
+            let column = self.columns.position(column)?;
+            Some(x[self.used.binary_search(&column).ok()?])
+        };
+        let offset_nm = value(Column::Offset(joint))?;
+        Some((offset_nm, value(Column::Coulomb(joint))?.abs()))
+    }
+
     /// Returns the prior mean and standard deviation of an offset that has a cost: from the previous solution, so that repeated
     /// solutions have a cost only of what is beyond [`OFFSET_FREE_SHARE`].
     fn offset_prior(
@@ -351,11 +366,9 @@ impl FitStage<'_> {
         if !costs[row] {
             return None;
         }
-        let coulomb = self.columns.position(Column::Coulomb(*joint))?;
-        let value = |column: usize| Some(x[self.used.binary_search(&column).ok()?]);
-        let coulomb_nm = value(coulomb)?.abs();
+        let (offset_nm, coulomb_nm) = self.offset_and_coulomb_nm(*joint, x)?;
         let free_nm = OFFSET_FREE_SHARE * coulomb_nm;
-        let mean_nm = value(self.columns.position(*column)?)?.clamp(-free_nm, free_nm);
+        let mean_nm = offset_nm.clamp(-free_nm, free_nm);
         let block = &blocks[row];
         let torque_nm = (block.torque_squared() / block.rows() as f64).sqrt();
         let deviation_nm = OFFSET_DRY_SHARE * coulomb_nm + OFFSET_TORQUE_SHARE * torque_nm;
