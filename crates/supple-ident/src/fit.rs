@@ -44,10 +44,11 @@ const EFFECT_PRIOR_WEIGHT: f64 = 50.0;
 /// Offset of a joint without a cost, in proportion to its Coulomb friction: differences of friction by direction and small currents of
 /// amplifiers are as large. Gravity and springs can nearly cancel a greater one in a motion, and not elsewhere.
 const OFFSET_FREE_SHARE: f64 = 0.1;
-/// Ratio of the residuals of a joint with the cost and without it, from which the motion shows that the offset is greater: then it has no cost.
+/// A joint's offset has no cost if the joint's residual with the cost is more than this multiple of that without it.
 const OFFSET_SHOWN: f64 = 1.5;
-/// Share of the Coulomb friction, and of the root mean square torque, in the prior standard deviation of what is beyond.
+/// Share of the Coulomb friction in the prior standard deviation of the offset beyond [`OFFSET_FREE_SHARE`].
 const OFFSET_DRY_SHARE: f64 = 0.4;
+/// Share of the root mean square torque in the same.
 const OFFSET_TORQUE_SHARE: f64 = 0.005;
 
 /// An identified model.

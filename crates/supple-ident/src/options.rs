@@ -34,7 +34,8 @@ pub struct Options {
     /// Weights of joints and samples.
     pub weights: Weights,
     /// `Some(weight of the prior)`: physically consistent estimate, see
-    /// [`crate::constrained_least_squares::Constraints::prior_weight`]; `None`: plain least squares.
+    /// [`crate::constrained_least_squares::Constraints::prior_weight`]; `None`: plain least squares. In a consistent estimate great offsets
+    /// have a cost, of a strength that does not depend on this weight.
     pub consistent_prior_weight: Option<f64>,
     /// Prior standard deviation of each rotor inertia, relative to the inertia of the nominal arm; `None`: unknown.
     pub rotor_deviation: Option<f64>,

@@ -20,6 +20,10 @@ READ = "id => document.getElementById(id).textContent"
 INK = """id => [...document.getElementById(id).querySelectorAll('canvas')].map(c => c.toDataURL()).join()"""
 
 
+class Complaint(Exception):
+    """Errors of the page and requests to other servers: no stall of the machine causes them."""
+
+
 def until(page: Page, what: str, condition, seconds: float = 60.0) -> None:
     """Waits until the condition holds."""
     for _ in range(int(seconds * 5)):
@@ -68,7 +72,8 @@ def check(page: Page, url: str, folder: Path, scheme: str, plant: str) -> None:
     until(page, f"{name} takes the drives' power", lambda: read("drives") == "idle")
     page.wait_for_timeout(500)
     page.screenshot(path=str(folder / f"stopped-{scheme}.png"), full_page=True)
-    assert not complaints, complaints
+    if complaints:
+        raise Complaint(complaints)
 
 
 def foreign(url: str, own: str, complaints: list[str]) -> None:
@@ -87,26 +92,32 @@ def has_stalled(program: Path, prefix: str) -> bool:
 
 
 def check_running(browser: Browser, program: Path, folder: Path, scheme: str, plant: str) -> None:
-    """Starts an arm and checks its page; begins again, at most four times, if the machine stalls: a page is drawn by all processors."""
+    """Starts an arm and checks its page; begins again, at most four times, if the machine stalls: drawing the page needs all processors."""
     prefix = f"page-{scheme}"
-    for later in reversed(range(5)):
+    for attempts_left in reversed(range(5)):
         with tempfile.TemporaryDirectory() as work:
             command = [program, "up", "--plant", plant, "--view", "--no-realtime", "--prefix", prefix]
             command += ["--block-m", "-0.3", "--log", Path(work) / "page.mcap"]
-            up = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
             context = browser.new_context(color_scheme=scheme, viewport={"width": 1280, "height": 900})
+            up = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
             try:
                 lines = iter(up.stderr.readline, "")
                 url = next(found[0] for line in lines if (found := re.search(r"http://127\.0\.0\.1\S+", line)))
                 return check(context.new_page(), url, folder, scheme, plant)
+            except Complaint:
+                raise
             except Exception as failure:
-                if later == 0 or not has_stalled(program, prefix):
+                if attempts_left == 0 or not has_stalled(program, prefix):
                     raise
                 print(f"the machine stalled, the check begins again after this failure: {failure}", flush=True)
             finally:
-                context.close()
                 up.terminate()
-                up.communicate(timeout=60)
+                try:
+                    up.communicate(timeout=60)
+                except subprocess.TimeoutExpired:
+                    up.kill()
+                    up.communicate()
+                context.close()
     raise AssertionError("no attempt")
 
 
