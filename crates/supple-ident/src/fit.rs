@@ -215,7 +215,7 @@ struct FitStage<'a> {
 }
 
 /// Previous solution, and the joints whose offsets have a cost.
-type Offsets<'a> = (&'a DVector<f64>, &'a [bool]);
+type OffsetCosts<'a> = (&'a DVector<f64>, &'a [bool]);
 type StageSolution = (DVector<f64>, Vec<ReducedSystem>, Vec<f64>, Option<f64>);
 
 impl FitStage<'_> {
@@ -246,7 +246,10 @@ impl FitStage<'_> {
             let (x, blocks, noise, _) = &solution;
             let is_great = |(cost, joint): (&bool, &usize)| {
                 let offset = self.offset_and_coulomb_nm(*joint, x);
-                *cost && offset.is_some_and(|(o, s)| o.abs() > OFFSET_FREE_SHARE * s)
+                *cost
+                    && offset.is_some_and(|(offset_nm, coulomb_nm)| {
+                        offset_nm.abs() > OFFSET_FREE_SHARE * coulomb_nm
+                    })
             };
             let joints = self.columns.identified_joints();
             if !costs.iter().zip(joints).any(is_great) {
@@ -268,6 +271,7 @@ impl FitStage<'_> {
         }
     }
 
+    /// Returns whether great offsets have a cost in this fit: it has offsets, and is physically consistent.
     fn has_offset_costs(&self) -> bool {
         let offsets = self.columns.friction().offset;
         offsets && self.options.consistent_prior_weight.is_some()
@@ -357,9 +361,9 @@ impl FitStage<'_> {
         &self,
         column: &Column,
         blocks: &[ReducedSystem],
-        offsets: Option<Offsets>,
+        offset_costs: Option<OffsetCosts>,
     ) -> Option<(f64, f64)> {
-        let (Column::Offset(joint), Some((x, costs))) = (column, offsets) else {
+        let (Column::Offset(joint), Some((x, costs))) = (column, offset_costs) else {
             return None;
         };
         let identified = self.columns.identified_joints();
@@ -376,13 +380,17 @@ impl FitStage<'_> {
         (deviation_nm > 0.0).then_some((mean_nm, deviation_nm))
     }
 
-    /// Returns the rows of the prior of effects, friction by load, rotors and `offsets`.
-    fn effect_prior(&self, blocks: &[ReducedSystem], offsets: Option<Offsets>) -> DMatrix<f64> {
+    /// Returns the rows of the prior of effects, friction by load, rotors and offsets.
+    fn effect_prior(
+        &self,
+        blocks: &[ReducedSystem],
+        offset_costs: Option<OffsetCosts>,
+    ) -> DMatrix<f64> {
         let known = self.used.iter().enumerate().filter_map(|(k, i)| {
             let column = &self.columns.list()[*i];
             let prior = effect_prior(column)
                 .or_else(|| self.load_prior(column))
-                .or_else(|| self.offset_prior(column, blocks, offsets));
+                .or_else(|| self.offset_prior(column, blocks, offset_costs));
             let (mean, deviation) = prior.or_else(|| self.rotor_prior(k, column))?;
             Some((k, mean, EFFECT_PRIOR_WEIGHT / deviation))
         });
@@ -399,10 +407,10 @@ impl FitStage<'_> {
         &self,
         blocks: &[ReducedSystem],
         noise: &[f64],
-        offsets: Option<Offsets>,
+        offset_costs: Option<OffsetCosts>,
     ) -> Result<(DVector<f64>, Option<f64>), IdentError> {
         let mut stacked = weighted(blocks, noise, self.used.len());
-        stacked.append(&self.effect_prior(blocks, offsets), 0);
+        stacked.append(&self.effect_prior(blocks, offset_costs), 0);
         let Some(prior_weight) = self.options.consistent_prior_weight else {
             return Ok((nearest(&stacked, &self.prior)?, None));
         };
