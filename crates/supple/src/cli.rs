@@ -469,7 +469,7 @@ pub struct UpArgs {
     #[arg(long, conflicts_with = "log")]
     pub no_log: bool,
     /// Also start the live page and print its URL, as `supple view` does.
-    #[arg(long, conflicts_with = "virtual_time")]
+    #[arg(long)]
     pub view: bool,
     /// Prefix of the new system. Default: SUPPLE_PREFIX or `supple`.
     #[arg(long, value_name = "NAME")]

@@ -276,6 +276,19 @@ impl<const N: usize> ViaPose<N> {
     }
 }
 
+/// Returns the moves that lead from one pose to another, by way of the via pose if there is one and the straight line needs it.
+pub fn moves<const N: usize>(
+    config: &Config<N>,
+    via_pose: Option<&ViaPose<N>>,
+    from_rad: &Vector<N>,
+    to_rad: &Vector<N>,
+) -> Vec<Step<N>> {
+    match via_pose {
+        Some(via_pose) => via_pose.moves(from_rad, to_rad),
+        None => vec![move_to(config, to_rad, from_rad)],
+    }
+}
+
 /// Returns the steps that move to the start of each series and follow it.
 pub fn follow<const N: usize>(
     config: &Config<N>,
@@ -287,10 +300,7 @@ pub fn follow<const N: usize>(
     let mut at_rad = *from_rad;
     for series in all {
         let start_rad = series.at(0.0).position_rad;
-        match via_pose {
-            Some(via_pose) => steps.extend(via_pose.moves(&at_rad, &start_rad)),
-            None => steps.push(move_to(config, &start_rad, &at_rad)),
-        }
+        steps.extend(moves(config, via_pose, &at_rad, &start_rad));
         steps.push(Step {
             recorded: true,
             ..Step::wait(Request::Excite(*series), series.duration_s)

@@ -1,4 +1,4 @@
-// Connection to the server by the Foxglove WebSocket protocol: one channel of pictures, one service for commands.
+// Connection to the server by the Foxglove WebSocket protocol: one channel of frames, one service for commands.
 
 const SUBPROTOCOL = "foxglove.websocket.v1";
 const CHANNEL = "/view";

@@ -129,7 +129,7 @@ async function replay(info, scene, plots) {
   for (const slider of document.querySelectorAll("#gains input, #gains label")) slider.hidden = true;
   element("player").hidden = false;
   const label = info.log.incomplete ? "log, cut off" : "log";
-  element("connection").textContent = `${label}: ${info.log.experiment}, ${rows.length} pictures`;
+  element("connection").textContent = `${label}: ${info.log.experiment}, ${rows.length} frames`;
   const slider = element("time");
   slider.max = String(Math.max(0, rows.length - 1));
   const end = rows.at(-1)?.time_s ?? 0;

@@ -1,4 +1,4 @@
-// The four plots. They show what `rows` holds: one row a picture, oldest first.
+// The four plots. They show what `rows` holds: one row a frame, oldest first.
 
 import uPlot from "uplot";
 
@@ -37,7 +37,7 @@ export class Plots {
       ],
     };
     this.labels = {
-      error: ["greatest"],
+      error: ["maximum"],
       force: ["size", "x", "y", "z"],
       torque: ["total", ...info.terms],
       timing: ["period", "step", "round trip"],
@@ -57,7 +57,7 @@ export class Plots {
         width: element.clientWidth || 320,
         height: HEIGHT,
         scales: { x: { time: false } },
-        axes: [{ ...axis, values: (_, ticks) => ticks.map((t) => `${t} s`) }, { ...axis, size: 56 }],
+        axes: [{ ...axis, values: (_, ticks) => ticks.map((t) => `${t} s`) }, { ...axis, size: 64 }],
         series: [{}, ...series(this.labels[name])],
         legend: { live: false },
         cursor: { drag: { x: true, y: false } },

@@ -2,7 +2,8 @@
 
 import {
   AmbientLight, ArrowHelper, Box3, BoxGeometry, BufferAttribute, BufferGeometry, Color, DirectionalLight, GridHelper,
-  Line, LineBasicMaterial, Mesh, MeshStandardMaterial, PerspectiveCamera, Scene, SphereGeometry, Vector3, WebGLRenderer,
+  Line, LineBasicMaterial, MathUtils, Mesh, MeshStandardMaterial, PerspectiveCamera, Scene, Sphere, SphereGeometry, Vector3,
+  WebGLRenderer,
 } from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { arm } from "./urdf.js";
@@ -11,6 +12,9 @@ const PATH_POINTS = 600;
 const ARROW_M_PER_N = 0.01;
 const MAX_ARROW_M = 0.5;
 const LEAST_FORCE_N = 0.5;
+// From where the camera looks, and the least radius that it sees.
+const DIRECTION = new Vector3(0.85, -1.2, 0.5).normalize();
+const LEAST_RADIUS_M = 0.4;
 
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
@@ -75,15 +79,26 @@ export class ArmScene {
     this.block = block;
   }
 
-  /** The camera sees the arm within its reach. */
+  /** The camera follows the arm until a hand takes it. */
   look() {
-    const box = new Box3().setFromObject(this.arm.root);
-    const reach = Math.max(0.8, box.getSize(new Vector3()).length());
-    const centre = box.getCenter(new Vector3());
-    this.camera.position.copy(centre).add(new Vector3(0.85, -1.2, 0.5).multiplyScalar(reach));
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
-    this.controls.target.copy(centre);
-    this.floorHeight = box.min.z;
+    this.controls.addEventListener("start", () => (this.seen = null));
+    this.seen = new Box3();
+    this.frameArm();
+    this.floorHeight = this.seen.min.z;
+  }
+
+  /** Everything that the arm has filled so far is in view. */
+  frameArm() {
+    if (!this.seen) return;
+    this.seen.expandByObject(this.arm.root);
+    const { center, radius } = this.seen.getBoundingSphere(new Sphere());
+    const half = MathUtils.degToRad(this.camera.fov / 2);
+    const narrower = Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect));
+    this.controls.target.copy(center);
+    this.camera.position
+      .copy(center)
+      .addScaledVector(DIRECTION, Math.max(LEAST_RADIUS_M, radius) / Math.sin(narrower));
   }
 
   colour() {
@@ -105,11 +120,13 @@ export class ArmScene {
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
+    this.frameArm();
   }
 
-  /** Draws a picture, with the points that led to it. */
+  /** Draws a frame, with the points that led to it. */
   show(frame, tipPath, referencePath) {
     frame.joints_rad.forEach((angle, i) => this.arm.set(this.joints[i], angle));
+    this.frameArm();
     this.tip.set(tipPath);
     this.reference.set(referencePath);
     this.marker.visible = frame.reference_m !== null;

@@ -1,10 +1,9 @@
 //! How well a model holds an arm: its drift in gravity hold, and its error under weak joint stiffness, in poses of the excitation.
 
 use super::{GAINS_S, ModelStage, Run, config};
-use crate::excite::move_to;
 use crate::procedure::arm::{Motion, MotionArm};
 use crate::procedure::error::ProcedureError;
-use crate::procedure::motions::Motions;
+use crate::procedure::motions::{Motions, moves};
 use crate::procedure::sweep::Sweep;
 use crate::procedure::{HOLD_REMEDY, Operator, ProcedureOptions};
 use crate::request_sequence::Step;
@@ -147,7 +146,10 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         pose_rad: &Vector<N>,
         check: &HoldCheckOptions<N>,
     ) -> Result<HeldPose, A::Error> {
-        let from_rad = self.arm.position_rad()?;
+        let via_pose = self.via_pose(ModelStage::Given)?;
+        let limits = self.limits;
+        let moves = |from_rad: &Vector<N>| moves(&limits, via_pose.as_ref(), from_rad, pose_rad);
+        let approach = moves(&self.arm.position_rad()?);
         let recorded = |request, duration_s| Step {
             recorded: true,
             ..Step::wait(request, duration_s)
@@ -160,10 +162,8 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             target_rad: *pose_rad,
             duration_s: HANDOVER_S,
         };
-        let steps = [
-            move_to(&self.limits, pose_rad, &from_rad),
-            recorded(Request::GravityHold, check.hold_s),
-        ];
+        let gravity_hold = recorded(Request::GravityHold, check.hold_s);
+        let steps = [approach, vec![gravity_hold]].concat();
         let mut held = HeldPose {
             position_rad: pose_rad.as_slice().to_vec(),
             tip_drift_m: None,
@@ -178,12 +178,12 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             }
         }
         // The arm may have drifted far.
-        let from_rad = self.arm.position_rad()?;
-        let steps = [
-            move_to(&self.limits, pose_rad, &from_rad),
+        let back = moves(&self.arm.position_rad()?);
+        let stiffness = [
             Step::wait(gains, GAINS_S),
             recorded(impedance, HANDOVER_S + check.hold_s),
         ];
+        let steps = [back, stiffness.to_vec()].concat();
         match self.held_motion(&format!("{name}-stiffness"), &steps)? {
             Ok(motion) => {
                 let end_rad = mean_rad::<N>(&motion, true, model.period_s);
