@@ -4,7 +4,7 @@ set -euo pipefail
 cd "$(dirname "$0")"
 
 PLAIN=(fmt clippy test doctest doc)
-FULL=(deny advisories page package urdfs edits fuzz)
+FULL=(deny advisories page package site browser urdfs edits fuzz)
 # Also of the full run: each mostly computes on one processor or waits, so they run one after the other beside those above.
 BESIDE=(ur10e python impact services ros socketcan instructions fused cycles cortex-m)
 CARGO_DENY_VERSION=0.20.2
@@ -68,7 +68,7 @@ step_page() {
     crates/supple-view/page/build.sh check
 }
 
-# browser: the live page of a simulated and of an emulated arm in headless Chromium; in no list; installs Chromium and Playwright
+# browser: the live page of a simulated and of an emulated arm in headless Chromium; installs Chromium and Playwright
 step_browser() {
     needs_command chromium chromium
     virtual_environment browser crates/supple-view/page/requirements.txt

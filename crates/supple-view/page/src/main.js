@@ -30,7 +30,10 @@ function say(text, refused) {
   element("answer").classList.toggle("refused", refused);
 }
 
-/** A slider whose steps are finer near zero, where 5 N/m and 50 N/m differ most. */
+/**
+ * A slider whose steps are finer near zero, where 5 N/m and 50 N/m differ most. `send` returns a promise; until it settles, only the
+ * last of further values waits.
+ */
 class Gain {
   constructor(name, unit, limit, send) {
     this.slider = element(name);
@@ -38,15 +41,29 @@ class Gain {
     this.unit = unit;
     this.limit = limit;
     this.held = false;
+    this.next = null;
+    this.sending = false;
     this.slider.addEventListener("input", () => {
       this.held = true;
       this.print(this.value());
     });
     this.slider.addEventListener("change", () => {
       this.held = false;
-      this.quietUntil = performance.now() + 1500;
-      send(this.value());
+      this.next = this.value();
+      this.sendNext(send);
     });
+  }
+
+  async sendNext(send) {
+    if (this.sending) return;
+    this.sending = true;
+    while (this.next !== null) {
+      const value = this.next;
+      this.next = null;
+      await send(value);
+      this.quietUntil = performance.now() + 1500;
+    }
+    this.sending = false;
   }
 
   value() {
@@ -60,7 +77,7 @@ class Gain {
 
   /** Follows what the controller reports, unless a hand is on it. */
   report(values) {
-    if (this.held || performance.now() < (this.quietUntil ?? 0)) return;
+    if (this.held || this.sending || performance.now() < (this.quietUntil ?? 0)) return;
     this.slider.value = Math.round(this.slider.max * Math.sqrt(values[0] / this.limit));
     this.print(Number(values[0].toPrecision(3)));
   }
@@ -104,7 +121,7 @@ function live(info, scene, plots) {
   });
   const request = (command, what) => {
     say(`${what} …`, false);
-    link.call(command).then(
+    return link.call(command).then(
       ({ mode }) => say(mode === "pendant" ? `${what}: pressed` : `${what}: mode ${words(mode)}`, false),
       (error) => say(error.message, true),
     );
