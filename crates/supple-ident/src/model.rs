@@ -67,12 +67,13 @@ pub fn friction(columns: &Columns, x: &DVector<f64>, load_nm: &[f64]) -> Vec<Fri
         let coulomb_nm =
             value(Column::Coulomb(j)) + load_coefficient * coulomb_at_nm + motor_coulomb_nm;
         let viscous_nm_s_per_rad = value(Column::Viscous(j)) + motor_viscous;
+        // The constraint of the fit holds up to rounding; a draw from its uncertainty may break it.
+        let asymmetry_limit = viscous_nm_s_per_rad.max(0.0);
         let shape = columns.friction();
         Friction {
             viscous_nm_s_per_rad,
-            // The constraint of the fit holds up to rounding.
             viscous_asymmetry_nm_s_per_rad: value(Column::Asymmetry(j))
-                .clamp(-viscous_nm_s_per_rad, viscous_nm_s_per_rad),
+                .clamp(-asymmetry_limit, asymmetry_limit),
             coulomb_nm,
             breakaway_nm: coulomb_nm + value(Column::Stribeck(j)),
             stribeck_rad_per_s: shape
@@ -146,4 +147,32 @@ fn rotor<const N: usize>(
 ) -> f64 {
     let column = columns.position(Column::Rotor(joint));
     column.map_or(nominal.armature()[joint], |i| x[i])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::friction;
+    use crate::columns::{Column, Columns, FrictionColumns};
+    use nalgebra::DVector;
+
+    /// Draws from the uncertainty of a fit contain such values: the friction is then invalid, which the draw notices.
+    #[test]
+    fn friction_of_negative_viscous_friction_is_invalid() {
+        let shape = FrictionColumns {
+            asymmetry: true,
+            ..FrictionColumns::COULOMB_AND_OFFSET
+        };
+        let columns = Columns::new(1, &[0], true, shape, &[]).unwrap();
+        let mut x = DVector::zeros(columns.len());
+        for (column, value) in [
+            (Column::Coulomb(0), 0.5),
+            (Column::Viscous(0), -0.1),
+            (Column::Asymmetry(0), 0.02),
+        ] {
+            x[columns.position(column).unwrap()] = value;
+        }
+        let drawn = friction(&columns, &x, &[0.0])[0];
+        assert_eq!(drawn.viscous_nm_s_per_rad, -0.1);
+        assert!(drawn.validate().is_err(), "{drawn:?}");
+    }
 }

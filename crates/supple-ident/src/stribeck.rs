@@ -2,11 +2,12 @@
 
 use crate::columns::FrictionColumns;
 use crate::error::IdentError;
-use crate::fit::{Fit, fit, speed_weights};
+use crate::fit::{Fit, fit};
 use crate::motion::Motion;
 use crate::presliding::presliding_rad;
 use crate::procedure::{FrictionChoice, Procedure};
 use crate::regressor::joint_rows;
+use crate::slow_motion::speed_weights;
 use supple_core::Arm;
 
 /// Candidate Stribeck speeds \[rad/s\].
