@@ -73,7 +73,7 @@ step_browser() {
     needs_command chromium chromium
     virtual_environment browser crates/supple-view/page/requirements.txt
     build_programs
-    CHROMIUM=$(command -v chromium) "$WORK/browser/bin/python" crates/supple-view/page/check_page.py \
+    CHROMIUM=$(command -v chromium) timeout 900 "$WORK/browser/bin/python" crates/supple-view/page/check_page.py \
         target/debug/supple $WORK/browser-screenshots
 }
 
@@ -129,15 +129,11 @@ step_site() {
     "$python" docs/site/check_inline.py --programs $programs
     "$python" docs/site/notebooks.py --programs $programs --out $made/notebooks >$WORK/notebooks.log 2>&1 &
     local notebooks=$!
-    "$python" docs/site/run_commands.py --programs $programs --figures $made/figures || {
-        wait $notebooks
-        return 1
-    }
-    wait $notebooks || {
-        cat $WORK/notebooks.log
-        return 1
-    }
+    local status=0
+    "$python" docs/site/run_commands.py --programs $programs --figures $made/figures || status=1
+    wait $notebooks || status=1
     cat $WORK/notebooks.log
+    [[ $status == 0 ]] || return 1
     local rustdoc=()
     [[ ! -d target/doc ]] || rustdoc=(--rustdoc target/doc)
     "$python" docs/site/build.py --programs $programs --figures $made/figures --notebooks $made/notebooks "${rustdoc[@]}"

@@ -171,6 +171,9 @@ class Runner:
             text = output.read()
         page.ran += 1
         if status != "0":
+            background = folder / ".background"
+            if background.exists():
+                text += "the system in the background:\n" + background.read_text(errors="replace")
             page.problems.append(f"{block}: exit code {status}\n{script}\n{text}")
         return status == "0"
 

@@ -35,7 +35,7 @@ pub(crate) struct StageSolution {
     pub(crate) x: DVector<f64>,
     /// Reduced system of each identified joint, with the last weights.
     pub(crate) blocks: Vec<ReducedSystem>,
-    /// RMS residual of each identified joint, by which its equations are divided \[N m\].
+    /// What the equations of each identified joint are divided by: its RMS residual, one value for all, or the given one \[N m\].
     pub(crate) noise_nm: Vec<f64>,
     /// Upper bound on the distance of the objective from its optimum, for a consistent fit.
     pub(crate) optimality_gap: Option<f64>,

@@ -67,7 +67,7 @@ pub fn friction(columns: &Columns, x: &DVector<f64>, load_nm: &[f64]) -> Vec<Fri
         let coulomb_nm =
             value(Column::Coulomb(j)) + load_coefficient * coulomb_at_nm + motor_coulomb_nm;
         let viscous_nm_s_per_rad = value(Column::Viscous(j)) + motor_viscous;
-        // The constraint of the fit holds up to rounding; a draw from its uncertainty may break it.
+        // The constraint of a consistent fit holds up to rounding; plain least squares and draws may break it.
         let asymmetry_limit = viscous_nm_s_per_rad.max(0.0);
         let shape = columns.friction();
         Friction {

@@ -4,7 +4,7 @@ use crate::columns::{Column, Columns};
 use crate::joint_rows::JointRows;
 use nalgebra::{DMatrix, DVector};
 
-/// Minimum number of samples of a joint.
+/// Minimum number of slow samples of a joint, and of those in which a direction shows the effect.
 const MIN_ROWS: usize = 20;
 /// Smallest eigenvalue of the scaled normal equations of the slow samples from which their torques are determined.
 const LEAST_INFORMATION: f64 = 1e-4;

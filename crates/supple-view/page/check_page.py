@@ -5,6 +5,8 @@
 Needs `pip install playwright` and Chromium (`CHROMIUM` names another program).
 """
 
+import contextlib
+import json
 import os
 import re
 import subprocess
@@ -17,7 +19,7 @@ from playwright.sync_api import Browser, Page, sync_playwright
 
 FLAGS = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 # Time after which an arm ends if this check does not end it [s of the arm's time].
-LONGEST_S = 36_000
+LONGEST_S = 7200
 READ = "id => document.getElementById(id).textContent"
 INK = """id => [...document.getElementById(id).querySelectorAll('canvas')].map(c => c.toDataURL()).join()"""
 
@@ -37,6 +39,8 @@ def check(page: Page, url: str, folder: Path, scheme: str, plant: str) -> None:
     complaints: list[str] = []
     page.on("pageerror", lambda error: complaints.append(str(error)))
     page.on("request", lambda request: foreign(request.url, url, complaints))
+    sent: list[dict] = []
+    page.on("websocket", lambda socket: socket.on("framesent", lambda data: note_command(data, sent)))
     page.goto(url)
     read = lambda name: page.evaluate(READ, name)
     until(page, "the arm tracks", lambda: read("mode") == "track")
@@ -51,24 +55,31 @@ def check(page: Page, url: str, folder: Path, scheme: str, plant: str) -> None:
     page.screenshot(path=str(folder / f"page-{scheme}.png"), full_page=True)
 
     slider = page.locator("#stiffness")
-    old = read("stiffness-reported")
+    old = float(read("stiffness-reported").split()[0])
+    sent.clear()
     slider.focus()
     for _ in range(12):
         page.keyboard.press("ArrowRight")
     wanted = float(read("stiffness-wanted").split()[0])
+    assert wanted > old + 0.5, f"the slider moved from {old} to {wanted} N/m"
     reported = lambda: float(read("stiffness-reported").split()[0])
     # The controller's own value, after its ramp; the page shows one decimal.
     until(page, f"stiffness {old} became {wanted} N/m", lambda: abs(reported() - wanted) <= 0.051)
+    gains = [command["stiffness_n_per_m"] for command in sent if command["request"] == "gains"]
+    assert gains[-1] == [wanted] * 3, f"the last request has the last value: {gains}"
 
     page.get_by_role("button", name="Gravity hold").click()
     until(page, "gravity hold", lambda: read("mode") == "gravity hold")
     page.get_by_role("button", name="Hold tip").click()
     until(page, "hold tip", lambda: read("mode") == "track")
+    assert not page.locator("#fault").is_visible(), "no fault so far"
     # Only the emulated arm has a pendant; its emergency stop takes the power of drives and encoders.
     if plant == "emu":
         page.get_by_role("button", name="Emergency stop", exact=True).click()
         until(page, "the emergency stop is a fault", lambda: read("mode") == "fault")
-        assert read("fault-text") and read("fault-remedy"), "the fault in words, with its remedy"
+        assert read("answer") == "Emergency stop: pressed", read("answer")
+        assert "no encoder reply" in read("fault-text"), read("fault-text")
+        assert read("fault-remedy"), "the fault has a remedy"
     else:
         page.get_by_role("button", name="Idle", exact=True).click()
         until(page, "idle takes the drives' power", lambda: read("drives") == "idle")
@@ -83,37 +94,71 @@ def foreign(url: str, own: str, complaints: list[str]) -> None:
         complaints.append(f"request to {url}")
 
 
+def note_command(data: str | bytes, sent: list[dict]) -> None:
+    """Notes a command that the page sends: JSON after the header of a call of the Foxglove protocol."""
+    if isinstance(data, bytes) and data[:1] == b"\x02":
+        sent.append(json.loads(data[data.index(b"{") :]))
+
+
 def check_running(browser: Browser, program: Path, folder: Path, scheme: str, plant: str) -> None:
-    """Starts an arm and checks its page. The arm's time is virtual: Chromium can use all processors for its drawing."""
-    with tempfile.TemporaryDirectory() as work, open(Path(work) / "up.log", "w+") as log:
-        command = [program, "up", "--plant", plant, "--view", "--prefix", f"page-{scheme}", "--block-m", "-0.3"]
-        command += ["--virtual-time", "--for", str(LONGEST_S), "--log", Path(work) / "page.mcap"]
+    """Starts an arm and checks its page. The arm's time is virtual: Chromium can use all processors for its drawing.
+
+    The simulated arm brings its page (`--view`). In virtual time the emulated arm ends with the fault: the viewer is on its own.
+    """
+    with tempfile.TemporaryDirectory() as work, contextlib.ExitStack() as running:
+        system = ["--prefix", f"page-{scheme}"]
+        options = [*system, "--block-m", "-0.3", "--virtual-time", "--for", str(LONGEST_S), "--no-log"]
+        up = start(running, [program, "up", "--plant", plant, *options, *(["--view"] if plant == "sim" else [])], Path(work) / "up")
+        viewer = up
+        if plant == "emu":
+            until_in(up, "track,")
+            viewer = start(running, [program, "view", *system, "--block-m", "-0.3"], Path(work) / "view")
+        url = until_in(viewer, r"http://127\.0\.0\.1\S+")
         context = browser.new_context(color_scheme=scheme, viewport={"width": 1280, "height": 900})
-        up = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=log)
         try:
-            check(context.new_page(), printed_url(log.name, up), folder, scheme, plant)
+            check(context.new_page(), url, folder, scheme, plant)
         except Exception:
-            print(Path(log.name).read_text(), file=sys.stderr)
+            print(up.output.read_text(), file=sys.stderr)
             raise
         finally:
+            running.close()
             context.close()
-            up.terminate()
-            try:
-                up.wait(timeout=60)
-            except subprocess.TimeoutExpired:
-                up.kill()
-                up.wait()
 
 
-def printed_url(log: str, up: subprocess.Popen) -> str:
-    """Waits for the URL of the page."""
+class Program(subprocess.Popen):
+    """A program with its output in a file."""
+
+    output: Path
+
+
+def start(running: contextlib.ExitStack, command: list, output: Path) -> Program:
+    """Starts a program, which ends with `running`."""
+    with output.open("w") as file:
+        program = Program(command, stdout=file, stderr=file)
+    program.output = output
+    running.callback(end, program)
+    return program
+
+
+def end(program: Program) -> None:
+    """Ends a program."""
+    program.terminate()
+    try:
+        program.wait(timeout=60)
+    except subprocess.TimeoutExpired:
+        program.kill()
+        program.wait()
+
+
+def until_in(program: Program, pattern: str) -> str:
+    """Waits until a program prints something; returns it."""
     for _ in range(600):
-        if found := re.search(r"http://127\.0\.0\.1\S+", Path(log).read_text()):
+        if found := re.search(pattern, program.output.read_text()):
             return found[0]
-        if up.poll() is not None:
+        if program.poll() is not None:
             break
         time.sleep(0.1)
-    raise AssertionError("the system has printed no URL")
+    raise AssertionError(f"the program has not printed {pattern}: {program.output.read_text()}")
 
 
 def main() -> None:

@@ -468,7 +468,7 @@ pub struct UpArgs {
     /// Write no log.
     #[arg(long, conflicts_with = "log")]
     pub no_log: bool,
-    /// Also start the live page and print its URL, as `supple view` does.
+    /// Also start the live page and print its URL, as `supple view` does. In virtual time the page ends with the run.
     #[arg(long)]
     pub view: bool,
     /// Prefix of the new system. Default: SUPPLE_PREFIX or `supple`.

@@ -359,3 +359,58 @@ pub fn ramps_s<const N: usize>(config: &Config<N>) -> f64 {
     let moves_s = 5.0 * N as f64 * move_to(config, &there, &there).duration_s;
     2.0 * breakaway_nm / BREAKAWAY_RAMP.0 + moves_s
 }
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::{TORQUE_SHARE, ViaPose, moves};
+    use supple_core::{Config, Vector};
+    use supple_model::Description;
+
+    /// Returns a YAM whose motors give 60 % of the torque that is commanded.
+    pub(in crate::procedure) fn yam() -> Config<6> {
+        let mut config: Config<6> = Description::asset("yam").unwrap().config().unwrap();
+        config.limits.joint_torque_nm *= 0.6;
+        config
+    }
+
+    /// Returns 100 poses that fill the limits of an arm: multiples of irrational numbers, without their integer part.
+    pub(in crate::procedure) fn spread_poses(config: &Config<6>) -> Vec<Vector<6>> {
+        let lower_rad = config.limits.position_lower_rad;
+        let range_rad = config.limits.position_upper_rad - lower_rad;
+        let share = |k: usize, j: usize| {
+            (k as f64 * [2.0, 3.0, 5.0, 7.0, 11.0, 13.0_f64][j].sqrt()).fract()
+        };
+        let pose = |k| Vector::from_fn(|j, _| lower_rad[j] + share(k, j) * range_rad[j]);
+        (1..=100).map(pose).collect()
+    }
+
+    /// Both a straight line that suffices and a way around it occur; the way around needs less torque.
+    #[test]
+    fn a_move_goes_by_a_via_pose_where_the_straight_line_needs_more_torque() {
+        let config = yam();
+        let mut counts = [0; 2];
+        for poses in spread_poses(&config).chunks_exact(4) {
+            let (from_rad, to_rad) = (&poses[0], &poses[1]);
+            let via_pose = ViaPose {
+                config,
+                via_rad: [poses[2], poses[3]],
+            };
+            let straight = via_pose.share_along(from_rad, to_rad);
+            let around = via_pose.via_rad.map(|via_rad| {
+                let first = via_pose.share_along(from_rad, &via_rad);
+                first.max(via_pose.share_along(&via_rad, to_rad))
+            });
+            let least = around[0].min(around[1]);
+            let steps = moves(&config, Some(&via_pose), from_rad, to_rad).len();
+            let goes_around = straight > TORQUE_SHARE && least < straight;
+            assert_eq!(
+                steps,
+                if goes_around { 2 } else { 1 },
+                "{straight} {around:?}"
+            );
+            assert_eq!(moves(&config, None, from_rad, to_rad).len(), 1);
+            counts[steps - 1] += 1;
+        }
+        assert!(counts[0] > 3 && counts[1] > 3, "{counts:?}");
+    }
+}

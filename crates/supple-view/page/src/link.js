@@ -50,7 +50,8 @@ export class Link {
     if (view.getUint8(0) === 1) this.onFrame(JSON.parse(rest(13)));
     if (view.getUint8(0) === 3) {
       const length = view.getUint32(9, true);
-      this.settle(view.getUint32(5, true))?.resolve(JSON.parse(rest(13 + length)));
+      const answer = JSON.parse(rest(13 + length));
+      this.settle(view.getUint32(5, true))?.resolve(answer);
     }
   }
 

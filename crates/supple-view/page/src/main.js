@@ -31,8 +31,8 @@ function say(text, refused) {
 }
 
 /**
- * A slider whose steps are finer near zero, where 5 N/m and 50 N/m differ most. `send` returns a promise; until it settles, only the
- * last of further values waits.
+ * A slider whose steps are finer near zero, where 5 N/m and 50 N/m differ most. `send` returns a promise of whether the value was
+ * accepted; until it settles, only the last of further values waits.
  */
 class Gain {
   constructor(name, unit, limit, send) {
@@ -40,8 +40,12 @@ class Gain {
     this.output = element(`${name}-wanted`);
     this.unit = unit;
     this.limit = limit;
+    this.send = send;
     this.held = false;
     this.next = null;
+    this.quietUntil = 0;
+    /** Settles when no value waits. */
+    this.sent = Promise.resolve();
     this.sending = false;
     this.slider.addEventListener("input", () => {
       this.held = true;
@@ -50,20 +54,26 @@ class Gain {
     this.slider.addEventListener("change", () => {
       this.held = false;
       this.next = this.value();
-      this.sendNext(send);
+      if (!this.sending) this.sent = this.sendNext();
     });
+    // A drag that ends where it began changes nothing.
+    for (const event of ["pointerup", "pointercancel", "keyup", "blur"]) {
+      this.slider.addEventListener(event, () => (this.held = false));
+    }
   }
 
-  async sendNext(send) {
-    if (this.sending) return;
+  async sendNext() {
     this.sending = true;
-    while (this.next !== null) {
-      const value = this.next;
-      this.next = null;
-      await send(value);
-      this.quietUntil = performance.now() + 1500;
+    try {
+      while (this.next !== null) {
+        const value = this.next;
+        this.next = null;
+        const accepted = await this.send(value);
+        this.quietUntil = accepted ? performance.now() + 1500 : 0;
+      }
+    } finally {
+      this.sending = false;
     }
-    this.sending = false;
   }
 
   value() {
@@ -75,9 +85,14 @@ class Gain {
     this.output.textContent = `${value} ${this.unit}`;
   }
 
-  /** Follows what the controller reports, unless a hand is on it. */
+  /** Whether the slider shows a requested value, which the controller does not report yet. */
+  isAhead() {
+    return this.held || this.sending || performance.now() < this.quietUntil;
+  }
+
+  /** Shows what the controller reports. */
   report(values) {
-    if (this.held || this.sending || performance.now() < (this.quietUntil ?? 0)) return;
+    if (this.isAhead()) return;
     this.slider.value = Math.round(this.slider.max * Math.sqrt(values[0] / this.limit));
     this.print(Number(values[0].toPrecision(3)));
   }
@@ -119,21 +134,34 @@ function live(info, scene, plots) {
       }
     },
   });
-  const request = (command, what) => {
+  const request = async (command, what) => {
     say(`${what} …`, false);
-    return link.call(command).then(
-      ({ mode }) => say(mode === "pendant" ? `${what}: pressed` : `${what}: mode ${words(mode)}`, false),
-      (error) => say(error.message, true),
-    );
+    try {
+      const { mode } = await link.call(command);
+      say(mode === "pendant" ? `${what}: pressed` : `${what}: mode ${words(mode)}`, false);
+      return true;
+    } catch (error) {
+      say(error.message, true);
+      return false;
+    }
   };
-  const stiffness = new Gain("stiffness", "N/m", info.max_stiffness_n_per_m, (value) =>
-    request({ request: "gains", stiffness_n_per_m: [value, value, value] }, `Stiffness ${value} N/m`),
-  );
-  const damping = new Gain("damping", "N s/m", info.max_damping_n_s_per_m, (value) =>
-    request({ request: "gains", damping_n_s_per_m: [value, value, value] }, `Damping ${value} N s/m`),
-  );
+  // A request sets both gains, and takes what the controller reports for one that it does not state.
+  const ahead = (gain, entry) => (gain.isAhead() ? { [entry]: Array(3).fill(gain.value()) } : {});
+  const stiffness = new Gain("stiffness", "N/m", info.max_stiffness_n_per_m, (value) => {
+    const gains = { stiffness_n_per_m: Array(3).fill(value), ...ahead(damping, "damping_n_s_per_m") };
+    return request({ request: "gains", ...gains }, `Stiffness ${value} N/m`);
+  });
+  const damping = new Gain("damping", "N s/m", info.max_damping_n_s_per_m, (value) => {
+    const gains = { damping_n_s_per_m: Array(3).fill(value), ...ahead(stiffness, "stiffness_n_per_m") };
+    return request({ request: "gains", ...gains }, `Damping ${value} N s/m`);
+  });
   for (const button of document.querySelectorAll("[data-request]")) {
-    button.addEventListener("click", () => request(JSON.parse(button.dataset.request), button.textContent));
+    const command = JSON.parse(button.dataset.request);
+    button.addEventListener("click", async () => {
+      // What takes the torque away waits for nothing; other modes begin with the gains that the sliders show.
+      if (!["idle", "pendant"].includes(command.request)) await Promise.all([stiffness.sent, damping.sent]);
+      request(command, button.textContent);
+    });
   }
   element("pendant").hidden = !info.pendant;
   for (const control of document.querySelectorAll("#gains input, #commands button")) control.disabled = !info.commands;

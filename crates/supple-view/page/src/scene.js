@@ -79,19 +79,25 @@ export class ArmScene {
     this.block = block;
   }
 
-  /** The camera follows the arm until a hand takes it. */
+  /** The camera follows the arm until the user moves it, and again after a double click. */
   look() {
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
     this.controls.addEventListener("start", () => (this.seen = null));
+    this.renderer.domElement.addEventListener("dblclick", () => {
+      this.seen = new Box3();
+      this.keepInView([]);
+    });
     this.seen = new Box3();
-    this.frameArm();
-    this.floorHeight = this.seen.min.z;
+    this.keepInView([]);
+    this.floorHeight = this.seen.isEmpty() ? 0 : this.seen.min.z;
   }
 
-  /** Everything that the arm has filled so far is in view. */
-  frameArm() {
+  /** Keeps in view what the arm has filled so far, and these points. */
+  keepInView(points) {
     if (!this.seen) return;
     this.seen.expandByObject(this.arm.root);
+    for (const point of points) this.seen.expandByPoint(new Vector3(...point));
+    if (this.seen.isEmpty()) return;
     const { center, radius } = this.seen.getBoundingSphere(new Sphere());
     const half = MathUtils.degToRad(this.camera.fov / 2);
     const narrower = Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect));
@@ -120,13 +126,13 @@ export class ArmScene {
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
-    this.frameArm();
+    this.keepInView([]);
   }
 
   /** Draws a frame, with the points that led to it. */
   show(frame, tipPath, referencePath) {
     frame.joints_rad.forEach((angle, i) => this.arm.set(this.joints[i], angle));
-    this.frameArm();
+    this.keepInView(frame.reference_m ? [frame.tip_m, frame.reference_m] : [frame.tip_m]);
     this.tip.set(tipPath);
     this.reference.set(referencePath);
     this.marker.visible = frame.reference_m !== null;

@@ -42,7 +42,9 @@ use supple_cli::exit::Failure;
 use supple_core::Trajectory;
 use supple_experiment::scenario;
 use supple_ipc::message::{Drives, OperatorReply, Outcome, Telemetry};
-use supple_ipc::{Domain, IpcError, idle_socket, idle_socket_is_open, request_idle};
+use supple_ipc::{
+    Domain, IpcError, TelemetryReader, idle_socket, idle_socket_is_open, request_idle,
+};
 use supple_model::{Description, with_dof};
 use supple_realtime::pause;
 
@@ -241,6 +243,7 @@ fn follow(
 ) -> Result<(), Failure> {
     fn sized<const N: usize>(
         domain: &Domain,
+        reader: &mut TelemetryReader,
         telemetry: &Telemetry,
         description: &Description,
         trajectory: Trajectory,
@@ -250,12 +253,12 @@ fn follow(
         let position = core::array::from_fn(|i| telemetry.record().position_rad[i]);
         let mut session = OperatorSession::<N>::new(domain)?;
         session.follow(&approach, &position.into(), None)?;
-        session.wait_for_all(approach.longest_wait(&position.into()))
+        session.wait_for_all(reader, approach.longest_wait(&position.into()))
     }
-    let (domain, _reader, telemetry) = running(system)?;
+    let (domain, mut reader, telemetry) = running(system)?;
     check_arm(&domain, arm, description, &telemetry)?;
     let reply = with_dof!(description.dof(), N => sized::<N>(
-        &domain, &telemetry, description, trajectory, duration_s
+        &domain, &mut reader, &telemetry, description, trajectory, duration_s
     ))??;
     print_reply(system, &reply)
 }

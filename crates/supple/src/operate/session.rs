@@ -7,7 +7,7 @@ use supple_cli::exit::Failure;
 use supple_core::Vector;
 use supple_core::controller::Request;
 use supple_ipc::message::{OperatorReply, Outcome};
-use supple_ipc::{Domain, IpcError, OperatorClient};
+use supple_ipc::{Domain, IpcError, OperatorClient, TelemetryReader};
 use supple_realtime::pause;
 
 /// Timeout for a reply.
@@ -193,18 +193,29 @@ impl<const N: usize> OperatorSession<N> {
         Ok(done)
     }
 
-    /// Waits until every request is executed; returns the reply to the last request.
+    /// Waits until every request is executed; returns the reply to the last request. Waits for at most this time of the arm, which in
+    /// virtual time passes faster or slower than that of the clock, and as long as the controller sends telemetry.
     ///
     /// # Errors
     /// The same as those of [`OperatorSession::send_request`].
-    pub fn wait_for_all(&mut self, within: Duration) -> Result<OperatorReply, Failure> {
-        let start = Instant::now();
+    pub fn wait_for_all(
+        &mut self,
+        reader: &mut TelemetryReader,
+        within: Duration,
+    ) -> Result<OperatorReply, Failure> {
+        let (mut first_ns, mut last_ns, mut received) = (None, 0, Instant::now());
         loop {
             let done = self.check()?;
             if let (Some(reply), true) = (done, self.pending_requests.is_empty()) {
                 return Ok(reply);
             }
-            if start.elapsed() > within {
+            while let Some(telemetry) = reader.receive().map_err(Failure::system)? {
+                last_ns = telemetry.state.stamp_ns;
+                first_ns.get_or_insert(last_ns);
+                received = Instant::now();
+            }
+            let passed_ns = first_ns.map_or(0, |first_ns| last_ns.saturating_sub(first_ns));
+            if Duration::from_nanos(passed_ns) > within || received.elapsed() > ANSWER_TIMEOUT {
                 return Err(self.not_running());
             }
             pause(POLL_INTERVAL);

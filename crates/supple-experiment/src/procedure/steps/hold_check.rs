@@ -3,7 +3,7 @@
 use super::{GAINS_S, ModelStage, Run, config};
 use crate::procedure::arm::{Motion, MotionArm};
 use crate::procedure::error::ProcedureError;
-use crate::procedure::motions::{Motions, moves};
+use crate::procedure::motions::{Motions, ViaPose, moves};
 use crate::procedure::sweep::Sweep;
 use crate::procedure::{HOLD_REMEDY, Operator, ProcedureOptions};
 use crate::request_sequence::Step;
@@ -105,19 +105,31 @@ pub fn check_hold<const N: usize, A: MotionArm<N>>(
     let model = config::<N>(start)?;
     let poses = poses(&model, &run.home_rad, &motions, check.poses);
     run.ensure_model(ModelStage::Given)?;
+    let (limits, home_rad) = (run.limits, run.home_rad);
+    let via_pose = run.via_pose(ModelStage::Given)?;
     let from_rad = run.arm.position_rad()?;
     let minutes = poses.len() as f64 * (2.0 * check.hold_s + 6.0) / 60.0;
     run.report(&format!(
         "{} poses follow, about {minutes:.0} minutes",
         poses.len()
     ));
-    run.confirm_sweep(&Sweep::of_moves(&model, &from_rad, &poses, &run.home_rad))?;
+    let route = every_way(&from_rad, &poses, &home_rad, via_pose.as_ref());
+    run.confirm_sweep(&Sweep::of_moves(&model, &from_rad, &route, &home_rad))?;
     let mut held = Vec::with_capacity(poses.len());
     for (number, pose_rad) in poses.iter().enumerate() {
         run.report(&format!("pose {} of {}", number + 1, poses.len()));
-        held.push(run.held_pose(&model, &format!("hold-{}", number + 1), pose_rad, check)?);
+        let moves = |from_rad: &Vector<N>| moves(&limits, via_pose.as_ref(), from_rad, pose_rad);
+        held.push(run.held_pose(
+            &model,
+            &format!("hold-{}", number + 1),
+            pose_rad,
+            &moves,
+            check,
+        )?);
     }
-    run.home("home")?;
+    run.motion("home", &|from_rad| {
+        moves(&limits, via_pose.as_ref(), from_rad, &home_rad)
+    })?;
     if let Some(fault) = held.iter().find_map(|pose| pose.ended.clone())
         && held.iter().all(|pose| pose.ended.is_some())
     {
@@ -144,11 +156,9 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         model: &Config<N>,
         name: &str,
         pose_rad: &Vector<N>,
+        moves: &dyn Fn(&Vector<N>) -> Vec<Step<N>>,
         check: &HoldCheckOptions<N>,
     ) -> Result<HeldPose, A::Error> {
-        let via_pose = self.via_pose(ModelStage::Given)?;
-        let limits = self.limits;
-        let moves = |from_rad: &Vector<N>| moves(&limits, via_pose.as_ref(), from_rad, pose_rad);
         let approach = moves(&self.arm.position_rad()?);
         let recorded = |request, duration_s| Step {
             recorded: true,
@@ -211,6 +221,26 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
     }
 }
 
+/// Returns a route over every way in which the arm may go from each pose to the next and home at the end: straight, or by a via pose.
+fn every_way<const N: usize>(
+    from_rad: &Vector<N>,
+    poses: &[Vector<N>],
+    home_rad: &Vector<N>,
+    via_pose: Option<&ViaPose<N>>,
+) -> Vec<Vector<N>> {
+    let vias = via_pose.map_or(&[][..], |via_pose| &via_pose.via_rad);
+    let mut route = Vec::new();
+    let mut at_rad = *from_rad;
+    for to_rad in poses.iter().chain([home_rad]) {
+        for via_rad in vias {
+            route.extend([*via_rad, *to_rad, at_rad]);
+        }
+        route.push(*to_rad);
+        at_rad = *to_rad;
+    }
+    route
+}
+
 /// Returns poses of the excitations at equal distances in time; held joints stay in the home pose.
 fn poses<const N: usize>(
     config: &Config<N>,
@@ -260,4 +290,48 @@ fn tip_drift_m<const N: usize>(model: &Config<N>, motion: &Motion) -> f64 {
         tip_pose(&model.arm, &position_rad).translation
     };
     (tip_m(true) - tip_m(false)).norm()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Sweep, ViaPose, every_way, moves};
+    use crate::procedure::motions::tests::{spread_poses, yam};
+    use supple_core::controller::Request;
+
+    /// Also where the arm goes by a via pose, it stays in the space that the operator confirmed.
+    #[test]
+    fn the_confirmed_space_contains_every_move() {
+        let config = yam();
+        let mut went_by_via_pose = 0;
+        for all in spread_poses(&config).chunks_exact(5) {
+            let (from_rad, poses, home_rad) = (all[0], &all[1..3], all[3]);
+            let via_pose = ViaPose {
+                config,
+                via_rad: [all[4], home_rad],
+            };
+            let route = every_way(&from_rad, poses, &home_rad, Some(&via_pose));
+            let confirmed = Sweep::of_moves(&config, &from_rad, &route, &home_rad);
+            let (mut at_rad, mut targets) = (from_rad, Vec::new());
+            for to_rad in poses.iter().chain([&home_rad]) {
+                let steps = moves(&config, Some(&via_pose), &at_rad, to_rad);
+                went_by_via_pose += steps.len() - 1;
+                for step in steps {
+                    let Request::Move { target_rad, .. } = step.request else {
+                        panic!("a move is expected");
+                    };
+                    targets.push(target_rad);
+                }
+                assert_eq!(targets.last(), Some(to_rad));
+                at_rad = *to_rad;
+            }
+            let moved = Sweep::of_moves(&config, &from_rad, &targets, &home_rad);
+            assert!(
+                confirmed.contains(&moved),
+                "{} does not contain {}",
+                confirmed.text(),
+                moved.text()
+            );
+        }
+        assert!(went_by_via_pose > 10, "{went_by_via_pose}");
+    }
 }
