@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PATTERNS = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/*.md", "benches/*/*.md")
+PATTERNS = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/*.md", "benches/*/*.md", "tests/*/*.md")
 # These tables of commands and results are written by a program, or describe old versions.
 NOT_CHECKED = ("CHANGELOG.md",)
 
