@@ -9,7 +9,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 PATTERNS = ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/*.md", "benches/*/*.md", "tests/*/*.md")
-# These tables of commands and results are written by a program, or describe old versions.
+# Its entries describe old versions.
 NOT_CHECKED = ("CHANGELOG.md",)
 
 FENCE = re.compile(r"^(?P<indent> *)```(?P<language>\w*)\n(?P<code>.*?)^ *```$", re.DOTALL | re.MULTILINE)

@@ -3,7 +3,7 @@
 use crate::error::ExperimentError;
 use crate::excite::move_to;
 use crate::request_sequence::Step;
-use supple_core::config::JointGains;
+use supple_core::config::{JointGains, Role};
 use supple_core::controller::{Breakaway, Request};
 use supple_core::dynamics::{crba, gravity, rnea};
 use supple_core::trajectory::{Fourier, HARMONICS, JointReference};
@@ -243,6 +243,18 @@ pub struct ViaPose<const N: usize> {
 }
 
 impl<const N: usize> ViaPose<N> {
+    /// Creates the via poses of an arm, whose held joints stay in the home pose.
+    pub fn new(config: Config<N>, light_rad: &Vector<N>, home_rad: Vector<N>) -> ViaPose<N> {
+        let light_rad = Vector::from_fn(|joint, _| match config.roles[joint] {
+            Role::Held { .. } => home_rad[joint],
+            Role::Active => light_rad[joint],
+        });
+        ViaPose {
+            config,
+            via_rad: [light_rad, home_rad],
+        }
+    }
+
     /// Returns the greatest share of a torque limit that gravity and dry friction under its load need along a line.
     fn share_along(&self, from_rad: &Vector<N>, to_rad: &Vector<N>) -> f64 {
         let config = &self.config;

@@ -154,8 +154,14 @@ impl Sweep {
 
     /// Returns whether the other space lies within this space.
     pub fn contains(&self, other: &Sweep) -> bool {
+        self.contains_within(other, 0.0)
+    }
+
+    /// Returns whether the other space lies within this space and this margin \[m\] around it.
+    pub fn contains_within(&self, other: &Sweep, margin_m: f64) -> bool {
         let within = |axis: usize| {
-            other.lower_m[axis] >= self.lower_m[axis] && other.upper_m[axis] <= self.upper_m[axis]
+            other.lower_m[axis] >= self.lower_m[axis] - margin_m
+                && other.upper_m[axis] <= self.upper_m[axis] + margin_m
         };
         (0..3).all(within)
     }

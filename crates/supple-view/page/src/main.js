@@ -76,6 +76,11 @@ class Gain {
     }
   }
 
+  /** Sends no value that still waits. */
+  forget() {
+    this.next = null;
+  }
+
   value() {
     const value = this.limit * (this.slider.value / this.slider.max) ** 2;
     return Number(value.toPrecision(value < 10 ? 2 : 3));
@@ -87,12 +92,12 @@ class Gain {
 
   /** Whether the slider shows a requested value, which the controller does not report yet. */
   isAhead() {
-    return this.held || this.sending || performance.now() < this.quietUntil;
+    return this.sending || performance.now() < this.quietUntil;
   }
 
   /** Shows what the controller reports. */
   report(values) {
-    if (this.isAhead()) return;
+    if (this.held || this.isAhead()) return;
     this.slider.value = Math.round(this.slider.max * Math.sqrt(values[0] / this.limit));
     this.print(Number(values[0].toPrecision(3)));
   }
@@ -155,11 +160,21 @@ function live(info, scene, plots) {
     const gains = { damping_n_s_per_m: Array(3).fill(value), ...ahead(stiffness, "stiffness_n_per_m") };
     return request({ request: "gains", ...gains }, `Damping ${value} N s/m`);
   });
+  let clicks = 0;
   for (const button of document.querySelectorAll("[data-request]")) {
     const command = JSON.parse(button.dataset.request);
     button.addEventListener("click", async () => {
-      // What takes the torque away waits for nothing; other modes begin with the gains that the sliders show.
-      if (!["idle", "pendant"].includes(command.request)) await Promise.all([stiffness.sent, damping.sent]);
+      clicks += 1;
+      const click = clicks;
+      // What ends a motion waits for nothing, and nothing that was requested before follows it. Other modes begin with the gains that
+      // the sliders show.
+      if (["idle", "gravity_hold", "pendant"].includes(command.request)) {
+        stiffness.forget();
+        damping.forget();
+      } else {
+        await Promise.all([stiffness.sent, damping.sent]);
+        if (click !== clicks) return;
+      }
       request(command, button.textContent);
     });
   }

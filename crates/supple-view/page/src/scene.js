@@ -82,7 +82,12 @@ export class ArmScene {
   /** The camera follows the arm until the user moves it, and again after a double click. */
   look() {
     this.controls = new OrbitControls(this.camera, this.renderer.domElement);
-    this.controls.addEventListener("start", () => (this.seen = null));
+    let moves = false;
+    this.controls.addEventListener("start", () => (moves = true));
+    this.controls.addEventListener("end", () => (moves = false));
+    this.controls.addEventListener("change", () => {
+      if (moves) this.seen = null;
+    });
     this.renderer.domElement.addEventListener("dblclick", () => {
       this.seen = new Box3();
       this.keepInView([]);
@@ -96,7 +101,7 @@ export class ArmScene {
   keepInView(points) {
     if (!this.seen) return;
     this.seen.expandByObject(this.arm.root);
-    for (const point of points) this.seen.expandByPoint(new Vector3(...point));
+    for (const point of points.filter((point) => point.every(Number.isFinite))) this.seen.expandByPoint(new Vector3(...point));
     if (this.seen.isEmpty()) return;
     const { center, radius } = this.seen.getBoundingSphere(new Sphere());
     const half = MathUtils.degToRad(this.camera.fov / 2);

@@ -243,7 +243,6 @@ fn follow(
 ) -> Result<(), Failure> {
     fn sized<const N: usize>(
         domain: &Domain,
-        reader: &mut TelemetryReader,
         telemetry: &Telemetry,
         description: &Description,
         trajectory: Trajectory,
@@ -253,12 +252,15 @@ fn follow(
         let position = core::array::from_fn(|i| telemetry.record().position_rad[i]);
         let mut session = OperatorSession::<N>::new(domain)?;
         session.follow(&approach, &position.into(), None)?;
-        session.wait_for_all(reader, approach.longest_wait(&position.into()))
+        let mut reader = TelemetryReader::new(domain).map_err(Failure::system)?;
+        session.wait_for_all(&mut reader, approach.longest_wait(&position.into()))
     }
-    let (domain, mut reader, telemetry) = running(system)?;
+    let (domain, reader, telemetry) = running(system)?;
+    // In virtual time the controller waits for every reader.
+    drop(reader);
     check_arm(&domain, arm, description, &telemetry)?;
     let reply = with_dof!(description.dof(), N => sized::<N>(
-        &domain, &mut reader, &telemetry, description, trajectory, duration_s
+        &domain, &telemetry, description, trajectory, duration_s
     ))??;
     print_reply(system, &reply)
 }

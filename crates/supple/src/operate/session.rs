@@ -194,7 +194,7 @@ impl<const N: usize> OperatorSession<N> {
     }
 
     /// Waits until every request is executed; returns the reply to the last request. Waits for at most this time of the arm, which in
-    /// virtual time passes faster or slower than that of the clock, and as long as the controller sends telemetry.
+    /// virtual time passes faster or slower than that of the clock, and as long as that advances.
     ///
     /// # Errors
     /// The same as those of [`OperatorSession::send_request`].
@@ -203,19 +203,24 @@ impl<const N: usize> OperatorSession<N> {
         reader: &mut TelemetryReader,
         within: Duration,
     ) -> Result<OperatorReply, Failure> {
-        let (mut first_ns, mut last_ns, mut received) = (None, 0, Instant::now());
+        let (mut passed_ns, mut last_ns, mut advanced) = (0, None, Instant::now());
         loop {
+            // Before the replies are read: those to what these cycles executed are there.
+            while let Some(telemetry) = reader.receive().map_err(Failure::system)? {
+                let now_ns = telemetry.state.stamp_ns;
+                // A plant that starts again begins with another time.
+                let step_ns = last_ns.map_or(0, |last_ns| now_ns.saturating_sub(last_ns));
+                last_ns = Some(now_ns);
+                if step_ns > 0 {
+                    passed_ns += step_ns;
+                    advanced = Instant::now();
+                }
+            }
             let done = self.check()?;
             if let (Some(reply), true) = (done, self.pending_requests.is_empty()) {
                 return Ok(reply);
             }
-            while let Some(telemetry) = reader.receive().map_err(Failure::system)? {
-                last_ns = telemetry.state.stamp_ns;
-                first_ns.get_or_insert(last_ns);
-                received = Instant::now();
-            }
-            let passed_ns = first_ns.map_or(0, |first_ns| last_ns.saturating_sub(first_ns));
-            if Duration::from_nanos(passed_ns) > within || received.elapsed() > ANSWER_TIMEOUT {
+            if Duration::from_nanos(passed_ns) > within || advanced.elapsed() > ANSWER_TIMEOUT {
                 return Err(self.not_running());
             }
             pause(POLL_INTERVAL);

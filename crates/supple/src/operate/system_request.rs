@@ -62,6 +62,20 @@ pub(super) enum SystemRequest<'a> {
 }
 
 impl SystemRequest<'_> {
+    /// Returns what the request changes, unless that is the mode.
+    fn change(&self) -> Option<&'static str> {
+        match self {
+            SystemRequest::Gains(_)
+            | SystemRequest::JointGains(_)
+            | SystemRequest::RotationalGains(_)
+            | SystemRequest::GainMatrices(_) => Some("the gains change"),
+            SystemRequest::Learning(LearningSwitch::On) => Some("learning is on"),
+            SystemRequest::Learning(LearningSwitch::Off) => Some("learning is off"),
+            SystemRequest::Learning(LearningSwitch::Reset) => Some("learning begins again"),
+            _ => None,
+        }
+    }
+
     pub(super) fn request<const N: usize>(
         &self,
         telemetry: &Telemetry,
@@ -246,6 +260,10 @@ pub(super) fn send_and_print(
     let (domain, _reader, telemetry) = running(system)?;
     let dof = usize::from(telemetry.state.dof);
     let reply = with_dof!(dof, N => send::<N>(&domain, &telemetry, request))??;
+    if let (Some(change), false) = (request.change(), system.json) {
+        let mode = reply.mode().map_or("unknown", |mode| mode.name());
+        return print_line(&format!("{change} from cycle {}; mode {mode}", reply.cycle));
+    }
     print_reply(system, &reply)
 }
 

@@ -154,6 +154,13 @@ fn teach_sized<const N: usize>(
             mode => mode.name(),
         },
     };
+    if let (Some(for_s), true) = (args.for_s, ended != Mode::Float) {
+        print_status(&format!(
+            "warning: the mode {} ended the recording before {for_s} s had passed: teach again when nothing else requests a mode, such \
+             as `supple up` until it tracks",
+            ended.name()
+        ));
+    }
     match args.system.json {
         true => print_json(&report)?,
         false => print_line(&format!(

@@ -28,8 +28,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             return Ok(None);
         };
         let config = config::<N>(&self.model(stage)?)?;
-        let via_rad = [light_rad, self.home_rad];
-        Ok(Some(ViaPose { config, via_rad }))
+        Ok(Some(ViaPose::new(config, &light_rad, self.home_rad)))
     }
 
     /// Designs the motions with the model of a stage.

@@ -18,6 +18,8 @@ use supple_model::Description;
 const MEAN_S: f64 = 0.5;
 /// Time in which weak stiffness takes over from the move \[s\].
 const HANDOVER_S: f64 = 1.0;
+/// Distance by which a way may leave the confirmed space, which is wider than the arm, without another question \[m\].
+const DRIFT_M: f64 = 0.05;
 
 /// Options of the check.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -159,7 +161,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         moves: &dyn Fn(&Vector<N>) -> Vec<Step<N>>,
         check: &HoldCheckOptions<N>,
     ) -> Result<HeldPose, A::Error> {
-        let approach = moves(&self.arm.position_rad()?);
+        let approach = self.confirmed_moves(model, moves)?;
         let recorded = |request, duration_s| Step {
             recorded: true,
             ..Step::wait(request, duration_s)
@@ -188,7 +190,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             }
         }
         // The arm may have drifted far.
-        let back = moves(&self.arm.position_rad()?);
+        let back = self.confirmed_moves(model, moves)?;
         let stiffness = [
             Step::wait(gains, GAINS_S),
             recorded(impedance, HANDOVER_S + check.hold_s),
@@ -202,6 +204,26 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             Err(fault) => held.ended = Some(fault),
         }
         Ok(held)
+    }
+
+    /// Returns the moves from the present pose. The operator confirms their space if it leaves the confirmed one: the arm has drifted far, or a
+    /// fault has laid it down.
+    fn confirmed_moves(
+        &mut self,
+        model: &Config<N>,
+        moves: &dyn Fn(&Vector<N>) -> Vec<Step<N>>,
+    ) -> Result<Vec<Step<N>>, A::Error> {
+        let from_rad = self.arm.position_rad()?;
+        let steps = moves(&from_rad);
+        let targets: Vec<_> = steps.iter().filter_map(move_target_rad).collect();
+        let end_rad = targets.last().copied().unwrap_or(from_rad);
+        let sweep = Sweep::of_moves(model, &from_rad, &targets, &end_rad);
+        let confirmed = self.progress.sweep.as_ref();
+        if !confirmed.is_some_and(|confirmed| confirmed.contains_within(&sweep, DRIFT_M)) {
+            self.report("the arm is elsewhere than planned: its way leaves the confirmed space");
+            self.confirm_sweep(&sweep)?;
+        }
+        Ok(steps)
     }
 
     /// Performs steps of which the last one is recorded; returns its data, or the fault that ended one of them.
@@ -218,6 +240,14 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         }
         let motion = performed.motions.into_iter().next();
         Ok(motion.ok_or_else(|| "no cycle was recorded".to_owned()))
+    }
+}
+
+/// Returns the target of a move.
+fn move_target_rad<const N: usize>(step: &Step<N>) -> Option<Vector<N>> {
+    match step.request {
+        Request::Move { target_rad, .. } => Some(target_rad),
+        _ => None,
     }
 }
 
@@ -261,13 +291,20 @@ fn poses<const N: usize>(
     let times = (0..count).map(|k| whole_s * (k as f64 + 0.5) / count as f64);
     times
         .map(at)
-        .map(|pose_rad| {
-            Vector::from_fn(|joint, _| match config.roles[joint] {
-                Role::Held { .. } => home_rad[joint],
-                Role::Active => pose_rad[joint],
-            })
-        })
+        .map(|pose_rad| with_held_at(config, &pose_rad, home_rad))
         .collect()
+}
+
+/// Returns a pose with the held joints of another one.
+fn with_held_at<const N: usize>(
+    config: &Config<N>,
+    pose_rad: &Vector<N>,
+    held_rad: &Vector<N>,
+) -> Vector<N> {
+    Vector::from_fn(|joint, _| match config.roles[joint] {
+        Role::Held { .. } => held_rad[joint],
+        Role::Active => pose_rad[joint],
+    })
 }
 
 /// Returns the mean angles over the first or the last [`MEAN_S`] of a motion.
@@ -294,9 +331,8 @@ fn tip_drift_m<const N: usize>(model: &Config<N>, motion: &Motion) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Sweep, ViaPose, every_way, moves};
+    use super::{Role, Sweep, ViaPose, every_way, move_target_rad, moves, with_held_at};
     use crate::procedure::motions::tests::{spread_poses, yam};
-    use supple_core::controller::Request;
 
     /// Also where the arm goes by a via pose, it stays in the space that the operator confirmed.
     #[test]
@@ -304,21 +340,25 @@ mod tests {
         let config = yam();
         let mut went_by_via_pose = 0;
         for all in spread_poses(&config).chunks_exact(5) {
-            let (from_rad, poses, home_rad) = (all[0], &all[1..3], all[3]);
-            let via_pose = ViaPose {
-                config,
-                via_rad: [all[4], home_rad],
-            };
+            let (from_rad, home_rad) = (all[0], all[3]);
+            let poses =
+                &[all[1], all[2]].map(|pose_rad| with_held_at(&config, &pose_rad, &home_rad));
+            let via_pose = ViaPose::new(config, &all[4], home_rad);
             let route = every_way(&from_rad, poses, &home_rad, Some(&via_pose));
             let confirmed = Sweep::of_moves(&config, &from_rad, &route, &home_rad);
             let (mut at_rad, mut targets) = (from_rad, Vec::new());
             for to_rad in poses.iter().chain([&home_rad]) {
                 let steps = moves(&config, Some(&via_pose), &at_rad, to_rad);
                 went_by_via_pose += steps.len() - 1;
-                for step in steps {
-                    let Request::Move { target_rad, .. } = step.request else {
-                        panic!("a move is expected");
-                    };
+                let moved_to = steps.iter().map(|step| move_target_rad(step).unwrap());
+                for target_rad in moved_to {
+                    for (joint, role) in config.roles.iter().enumerate() {
+                        let is_there = target_rad[joint] == home_rad[joint];
+                        assert!(
+                            is_there || !matches!(role, Role::Held { .. }),
+                            "joint {joint}"
+                        );
+                    }
                     targets.push(target_rad);
                 }
                 assert_eq!(targets.last(), Some(to_rad));
