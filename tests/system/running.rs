@@ -56,6 +56,8 @@ pub fn stderr_of(output: &Output) -> String {
 pub struct Up {
     pub folder: TempDir,
     child: Option<Child>,
+    /// What it has written on standard error; empty until it has ended.
+    written: String,
 }
 
 impl Up {
@@ -66,7 +68,12 @@ impl Up {
             .process_group(0)
             .spawn();
         let child = Some(child.expect("it starts"));
-        Up { folder, child }
+        let written = String::new();
+        Up {
+            folder,
+            child,
+            written,
+        }
     }
 
     /// Starts a system as [`Up::start`] does, and waits until it tracks. If a busy machine stalls a process, so that the drives become
@@ -111,12 +118,16 @@ impl Up {
     /// Whether answers were missed, and the drives are idle while the controller is active, or a fault is latched that missed answers
     /// cause: this is so after a stall of the machine.
     fn has_stalled(&self) -> bool {
+        let late = ["no new arm state", "no encoder reply"];
+        if self.child.is_none() {
+            let faults = late.map(|words| format!("fault: {words}"));
+            return faults.iter().any(|fault| self.written.contains(fault));
+        }
         let output = self.run(&["status", "--json"]);
         let status: Value = serde_json::from_slice(&output.stdout).unwrap_or_default();
         let missed = status["missed"].as_u64().unwrap_or(0);
         let lost = status["drives"] == "idle" && status["mode"] == "gravity_hold";
         let fault = status["fault"].as_str().unwrap_or_default();
-        let late = ["no new arm state", "no encoder reply"];
         (lost || late.iter().any(|words| fault.contains(words))) && missed > 0
     }
 
@@ -170,7 +181,9 @@ impl Up {
     /// Waits until `supple up` exits by itself; returns its output.
     pub fn ended(&mut self) -> Output {
         let child = self.child.take().expect("running");
-        child.wait_with_output().expect("it ends")
+        let output = child.wait_with_output().expect("it ends");
+        self.written = stderr_of(&output);
+        output
     }
 
     /// Terminates `supple up`; returns its output.
