@@ -301,6 +301,26 @@ pub fn moves<const N: usize>(
     }
 }
 
+/// Returns a route over every way in which the arm may go from each pose to the next and home at the end: straight, or by a via pose.
+pub fn every_way<const N: usize>(
+    from_rad: &Vector<N>,
+    poses: &[Vector<N>],
+    home_rad: &Vector<N>,
+    via_pose: Option<&ViaPose<N>>,
+) -> Vec<Vector<N>> {
+    let vias = via_pose.map_or(&[][..], |via_pose| &via_pose.via_rad);
+    let mut route = Vec::new();
+    let mut at_rad = *from_rad;
+    for to_rad in poses.iter().chain([home_rad]) {
+        for via_rad in vias {
+            route.extend([*via_rad, *to_rad, at_rad]);
+        }
+        route.push(*to_rad);
+        at_rad = *to_rad;
+    }
+    route
+}
+
 /// Returns the steps that move to the start of each series and follow it.
 pub fn follow<const N: usize>(
     config: &Config<N>,

@@ -114,7 +114,8 @@ impl Sweep {
         sweep.with_thickness()
     }
 
-    fn with(mut self, other: Sweep) -> Sweep {
+    /// Returns the space of both.
+    pub fn with(mut self, other: Sweep) -> Sweep {
         for axis in 0..3 {
             self.lower_m[axis] = self.lower_m[axis].min(other.lower_m[axis]);
             self.upper_m[axis] = self.upper_m[axis].max(other.upper_m[axis]);

@@ -4,7 +4,9 @@ use super::{FLOAT_S, GAINS_S, ModelStage, REST_S, Run, config};
 use crate::excite::move_to;
 use crate::procedure::arm::MotionArm;
 use crate::procedure::error::ProcedureError;
-use crate::procedure::motions::{DesignPlan, Motions, ViaPose, follow, gains_along, ramps_s};
+use crate::procedure::motions::{
+    DesignPlan, Motions, ViaPose, every_way, follow, gains_along, ramps_s,
+};
 use crate::procedure::progress::{StepName, write_whole};
 use crate::procedure::sweep::Sweep;
 use crate::procedure::{DRAWING, LEARNING_S};
@@ -67,7 +69,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         }
         let motions = self.design(ModelStage::First)?;
         let config = config::<N>(&self.model(ModelStage::First)?)?;
-        let sweep = Sweep::of(&config, &self.home_rad, &motions.all());
+        let sweep = self.sweep(&config, &motions);
         let confirmed = self.progress.sweep.as_ref();
         if confirmed.is_none_or(|confirmed| !confirmed.contains(&sweep)) {
             self.report("by the model of the first pass the arm sweeps another space");
@@ -85,6 +87,27 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         gains.damping_nm_s_per_rad = gains.damping_nm_s_per_rad.inf(&own.damping_nm_s_per_rad);
         self.first_gains = Some(gains);
         Ok(motions)
+    }
+
+    /// Returns the space of the motions, and of the ways between them by a via pose.
+    fn sweep(&self, config: &Config<N>, motions: &Motions<N>) -> Sweep {
+        let all = motions.all();
+        let sweep = Sweep::of(config, &self.home_rad, &all);
+        let Some(light_rad) = self.light_rad else {
+            return sweep;
+        };
+        let via_pose = ViaPose::new(*config, &light_rad, self.home_rad);
+        let ends = all.iter().flat_map(|series| {
+            [0.0, series.duration_s].map(|time_s| series.at(time_s).position_rad)
+        });
+        let ends: Vec<_> = ends.collect();
+        let route = every_way(&self.home_rad, &ends, &self.home_rad, Some(&via_pose));
+        sweep.with(Sweep::of_moves(
+            config,
+            &self.home_rad,
+            &route,
+            &self.home_rad,
+        ))
     }
 
     /// Asks the operator whether the arm may sweep a space.
@@ -107,7 +130,7 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         config: &Config<N>,
         motions: &Motions<N>,
     ) -> Result<(), A::Error> {
-        let sweep = Sweep::of(config, &self.home_rad, &motions.all());
+        let sweep = self.sweep(config, motions);
         if self.progress.finished(StepName::Confirmed).is_some() {
             // After the first fit the arm moves by another design, which is confirmed if it leaves this space.
             let moves_by_another = self.progress.finished(StepName::FirstFit).is_some();

@@ -3,7 +3,7 @@
 use super::{GAINS_S, ModelStage, Run, config};
 use crate::procedure::arm::{Motion, MotionArm};
 use crate::procedure::error::ProcedureError;
-use crate::procedure::motions::{Motions, ViaPose, moves};
+use crate::procedure::motions::{Motions, every_way, moves};
 use crate::procedure::sweep::Sweep;
 use crate::procedure::{HOLD_REMEDY, Operator, ProcedureOptions};
 use crate::request_sequence::Step;
@@ -251,26 +251,6 @@ fn move_target_rad<const N: usize>(step: &Step<N>) -> Option<Vector<N>> {
     }
 }
 
-/// Returns a route over every way in which the arm may go from each pose to the next and home at the end: straight, or by a via pose.
-fn every_way<const N: usize>(
-    from_rad: &Vector<N>,
-    poses: &[Vector<N>],
-    home_rad: &Vector<N>,
-    via_pose: Option<&ViaPose<N>>,
-) -> Vec<Vector<N>> {
-    let vias = via_pose.map_or(&[][..], |via_pose| &via_pose.via_rad);
-    let mut route = Vec::new();
-    let mut at_rad = *from_rad;
-    for to_rad in poses.iter().chain([home_rad]) {
-        for via_rad in vias {
-            route.extend([*via_rad, *to_rad, at_rad]);
-        }
-        route.push(*to_rad);
-        at_rad = *to_rad;
-    }
-    route
-}
-
 /// Returns poses of the excitations at equal distances in time; held joints stay in the home pose.
 fn poses<const N: usize>(
     config: &Config<N>,
@@ -331,7 +311,8 @@ fn tip_drift_m<const N: usize>(model: &Config<N>, motion: &Motion) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Role, Sweep, ViaPose, every_way, move_target_rad, moves, with_held_at};
+    use super::{Role, Sweep, every_way, move_target_rad, moves, with_held_at};
+    use crate::procedure::motions::ViaPose;
     use crate::procedure::motions::tests::{spread_poses, yam};
 
     /// Also where the arm goes by a via pose, it stays in the space that the operator confirmed.
