@@ -245,13 +245,9 @@ pub struct ViaPose<const N: usize> {
 impl<const N: usize> ViaPose<N> {
     /// Creates the via poses of an arm, whose held joints stay in the home pose.
     pub fn new(config: Config<N>, light_rad: &Vector<N>, home_rad: Vector<N>) -> ViaPose<N> {
-        let light_rad = Vector::from_fn(|joint, _| match config.roles[joint] {
-            Role::Held { .. } => home_rad[joint],
-            Role::Active => light_rad[joint],
-        });
         ViaPose {
             config,
-            via_rad: [light_rad, home_rad],
+            via_rad: [with_held_at(&config, light_rad, &home_rad), home_rad],
         }
     }
 
@@ -286,6 +282,18 @@ impl<const N: usize> ViaPose<N> {
             _ => direct,
         }
     }
+}
+
+/// Returns a pose with the held joints of another one.
+pub fn with_held_at<const N: usize>(
+    config: &Config<N>,
+    pose_rad: &Vector<N>,
+    held_rad: &Vector<N>,
+) -> Vector<N> {
+    Vector::from_fn(|joint, _| match config.roles[joint] {
+        Role::Held { .. } => held_rad[joint],
+        Role::Active => pose_rad[joint],
+    })
 }
 
 /// Returns the moves that lead from one pose to another, by way of the via pose if there is one and the straight line needs it.

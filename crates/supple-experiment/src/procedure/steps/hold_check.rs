@@ -3,12 +3,12 @@
 use super::{GAINS_S, ModelStage, Run, config};
 use crate::procedure::arm::{Motion, MotionArm};
 use crate::procedure::error::ProcedureError;
-use crate::procedure::motions::{Motions, every_way, moves};
+use crate::procedure::motions::{Motions, every_way, moves, with_held_at};
 use crate::procedure::sweep::Sweep;
 use crate::procedure::{HOLD_REMEDY, Operator, ProcedureOptions};
 use crate::request_sequence::Step;
 use serde::Serialize;
-use supple_core::config::{JointGains, Role};
+use supple_core::config::JointGains;
 use supple_core::controller::Request;
 use supple_core::dynamics::tip_pose;
 use supple_core::{Config, Vector};
@@ -218,10 +218,9 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         let targets: Vec<_> = steps.iter().filter_map(move_target_rad).collect();
         let end_rad = targets.last().copied().unwrap_or(from_rad);
         let sweep = Sweep::of_moves(model, &from_rad, &targets, &end_rad);
-        let confirmed = self.progress.sweep.as_ref();
-        if !confirmed.is_some_and(|confirmed| confirmed.contains_within(&sweep, DRIFT_M)) {
+        if let Some(wider) = beyond(self.progress.sweep.as_ref(), sweep) {
             self.report("the arm is elsewhere than planned: its way leaves the confirmed space");
-            self.confirm_sweep(&sweep)?;
+            self.confirm_sweep(&wider)?;
         }
         Ok(steps)
     }
@@ -240,6 +239,15 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         }
         let motion = performed.motions.into_iter().next();
         Ok(motion.ok_or_else(|| "no cycle was recorded".to_owned()))
+    }
+}
+
+/// Returns the space to confirm if a way leaves the confirmed one by more than [`DRIFT_M`]: both, so that later ways need no question.
+fn beyond(confirmed: Option<&Sweep>, way: Sweep) -> Option<Sweep> {
+    match confirmed {
+        Some(confirmed) if confirmed.contains_within(&way, DRIFT_M) => None,
+        Some(confirmed) => Some(confirmed.clone().with(way)),
+        None => Some(way),
     }
 }
 
@@ -275,18 +283,6 @@ fn poses<const N: usize>(
         .collect()
 }
 
-/// Returns a pose with the held joints of another one.
-fn with_held_at<const N: usize>(
-    config: &Config<N>,
-    pose_rad: &Vector<N>,
-    held_rad: &Vector<N>,
-) -> Vector<N> {
-    Vector::from_fn(|joint, _| match config.roles[joint] {
-        Role::Held { .. } => held_rad[joint],
-        Role::Active => pose_rad[joint],
-    })
-}
-
 /// Returns the mean angles over the first or the last [`MEAN_S`] of a motion.
 fn mean_rad<const N: usize>(motion: &Motion, last: bool, period_s: f64) -> Vector<N> {
     let q = &motion.recording.q_rad;
@@ -311,9 +307,10 @@ fn tip_drift_m<const N: usize>(model: &Config<N>, motion: &Motion) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Role, Sweep, every_way, move_target_rad, moves, with_held_at};
+    use super::{DRIFT_M, Sweep, beyond, every_way, move_target_rad, moves, with_held_at};
     use crate::procedure::motions::ViaPose;
     use crate::procedure::motions::tests::{spread_poses, yam};
+    use supple_core::config::Role;
 
     /// Also where the arm goes by a via pose, it stays in the space that the operator confirmed.
     #[test]
@@ -354,5 +351,26 @@ mod tests {
             );
         }
         assert!(went_by_via_pose > 10, "{went_by_via_pose}");
+    }
+
+    /// What was confirmed stays confirmed, and a drift within the margin asks nothing.
+    #[test]
+    fn a_way_beyond_the_confirmed_space_adds_to_it() {
+        let config = yam();
+        let poses = spread_poses(&config);
+        let way = |pair: &[_]| Sweep::of_moves(&config, &pair[0], &pair[1..], &pair[1]);
+        let mut asked = 0;
+        for four in poses.chunks_exact(4) {
+            let (confirmed, other) = (way(&four[..2]), way(&four[2..]));
+            let wider = beyond(Some(&confirmed), other.clone());
+            assert_eq!(wider.is_none(), confirmed.contains_within(&other, DRIFT_M));
+            assert_eq!(beyond(Some(&confirmed), confirmed.clone()), None);
+            if let Some(wider) = wider {
+                asked += 1;
+                assert!(wider.contains(&confirmed) && wider.contains(&other));
+                assert_eq!(beyond(Some(&wider), other), None);
+            }
+        }
+        assert!(asked > 3, "{asked}");
     }
 }
