@@ -151,12 +151,32 @@ fn execute_or_refuse_requests(up: &mut Up) {
     assert!(output.status.success(), "{}", stderr_of(&output));
     up.wait_until("the arc", |status| status["mode"] == "track");
 
-    let output = up.run(&["stop"]);
+    let output = up.run(&["stop", "--json"]);
     assert!(output.status.success(), "{}", stderr_of(&output));
+    assert_eq!(json(&output)["ended"], true, "it waits for the end");
     let output = up.ended();
     assert!(output.status.success(), "{}", stderr_of(&output));
     let replayed = up.run(&["log", "replay", "out/up.mcap"]);
     assert!(replayed.status.success(), "{}", stderr_of(&replayed));
+}
+
+/// A run without `--log` keeps the log of the run before it under another name; one with `--log` replaces its file.
+#[test]
+fn a_second_run_keeps_the_log_of_the_first() {
+    let folder = temporary_folder();
+    let up = |more: &[&str]| {
+        let short = ["up", "--plant", "sim", "--virtual-time", "--for", "0.2"];
+        let output = run(folder.path(), &[&short[..], more].concat());
+        assert!(output.status.success(), "{}", stderr_of(&output));
+    };
+    let read = |name: &str| std::fs::read(folder.path().join(name)).expect("a log");
+    up(&[]);
+    let first = read("out/up.mcap");
+    up(&["--arm", "wam7"]);
+    assert!(read("out/up.previous.mcap") == first);
+    up(&["--log", "out/up.mcap"]);
+    assert!(read("out/up.mcap") == first, "the first run again");
+    assert!(read("out/up.previous.mcap") == first);
 }
 
 #[test]

@@ -110,6 +110,9 @@ impl<const N: usize> Fit<N> {
     }
 }
 
+/// Torque error relative to the torque above which a model is poor, and up to which it is good.
+const POOR: f64 = 0.2;
+const GOOD: f64 = 0.05;
 /// Ratio of a joint's error to the deviation of its torque above which its model counts as poor.
 const POOR_JOINT: f64 = 0.5;
 
@@ -131,7 +134,7 @@ pub fn verdict(held_out: &[(String, &Validation)], joints: &[String]) -> String 
     };
     let plain = worst.verdict();
     let percent = 100.0 * error;
-    if worst.positive_definite < 1.0 || worst.total_relative > 0.2 {
+    if worst.positive_definite < 1.0 || worst.total_relative > POOR {
         return format!("{plain} (log {name})");
     }
     if error > POOR_JOINT {
@@ -157,14 +160,18 @@ impl Validation {
                  use the physically consistent method"
             );
         }
-        if self.total_relative > 0.2 {
+        if self.total_relative > POOR {
             return format!(
                 "poor: {error:.1} % torque error on held-out data; \
                  check the signs and scales of the torques, and the columns"
             );
         }
+        let grade = match self.total_relative <= GOOD {
+            true => "good",
+            false => "fair",
+        };
         format!(
-            "good: {error:.2} % torque error on held-out data, positive definite in all poses tried"
+            "{grade}: {error:.2} % torque error on held-out data, positive definite in all poses tried"
         )
     }
 }

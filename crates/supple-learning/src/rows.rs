@@ -246,8 +246,7 @@ impl<const N: usize> Rows<N> {
                 columns[OFFSET] = 1.0;
                 let loaded = &loaded[i];
                 columns[PRESLIDING] = loaded.dry_size_nm(velocity[i]) * self.by_presliding[i];
-                let relative = velocity[i] / loaded.stribeck_rad_per_s;
-                columns[STRIBECK_OFFSET] = exp(-relative * relative);
+                columns[STRIBECK_OFFSET] = loaded.stribeck_share(velocity[i]);
                 columns[STRIBECK] = columns[STRIBECK_OFFSET] * direction;
                 for (k, weight) in map.weights.iter().enumerate() {
                     columns[MAP_TORQUE + map.first + k] = *weight;

@@ -9,7 +9,8 @@ pub fn remedy(kind: u8) -> &'static str {
             "Check the sensor and its cable; the arm brakes until the sensor reports finite values again."
         }
         fault::ENCODER_LOST => {
-            "Check the bus and the cable of this joint, then reset and enter gravity hold."
+            "Check the bus and the cable of this joint; on a busy machine replies also come too late (supple doctor). Then reset and \
+             enter gravity hold."
         }
         fault::STATE_STALE => {
             "The plant sent no states: check its process and the load of the machine (supple doctor), then reset."

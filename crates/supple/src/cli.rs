@@ -95,7 +95,7 @@ pub enum Command {
     Drill(DrillArgs),
     /// Clear the latched fault of a running system.
     Reset(SystemArgs),
-    /// Shut a running system down; its controller first sets the drives to idle.
+    /// Shut a running system down, and wait until it has ended: the controller sets the drives to idle, an arm without brakes is laid down.
     Stop(StopArgs),
     /// Check whether this machine can run an arm in real time.
     #[command(after_help = CODES)]
@@ -210,6 +210,9 @@ pub struct StopArgs {
     /// Declare that the arm is supported: an arm that `supple up --hold-until-supported` holds is released.
     #[arg(long)]
     pub supported: bool,
+    /// Return at once, while the system still shuts down.
+    #[arg(long)]
+    pub no_wait: bool,
     /// The system.
     #[command(flatten)]
     pub system: SystemArgs,
@@ -462,9 +465,10 @@ pub struct UpArgs {
     /// Run in virtual time: all processes in lockstep, as fast as possible. Requires --for.
     #[arg(long, requires = "for_s")]
     pub virtual_time: bool,
-    /// The log; an existing file is replaced, a missing folder is created.
-    #[arg(long, value_name = "FILE", default_value = "out/up.mcap")]
-    pub log: PathBuf,
+    /// The log; an existing file is replaced, a missing folder is created. Default: out/up.mcap, and the log of the run before is kept
+    /// as out/up.previous.mcap.
+    #[arg(long, value_name = "FILE")]
+    pub log: Option<PathBuf>,
     /// Write no log.
     #[arg(long, conflicts_with = "log")]
     pub no_log: bool,

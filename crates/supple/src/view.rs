@@ -9,7 +9,7 @@ use supple_cli::console::{print_json, print_line, print_status};
 use supple_cli::exit::Failure;
 use supple_cli::interrupt;
 use supple_cli::range::between;
-use supple_ipc::Domain;
+use supple_ipc::{Domain, idle_socket_is_open};
 use supple_realtime::die_with_parent;
 use supple_view::{Addresses, Options, Source, ViewError};
 
@@ -70,6 +70,12 @@ pub fn run(args: &ViewArgs) -> Result<(), Failure> {
         Some(log) => Source::Log(log.clone()),
         None => {
             let domain = Domain::new(args.prefix.as_deref()).map_err(Failure::system)?;
+            if !args.supervised && !idle_socket_is_open(&domain) {
+                print_status(&format!(
+                    "no system runs with prefix {}: the page waits for `supple up`",
+                    domain.prefix()
+                ));
+            }
             let arm = arm_of(&domain, args.arm.as_deref(), &args.urdf);
             Source::System {
                 domain: Box::new(domain),

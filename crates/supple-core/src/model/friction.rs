@@ -305,8 +305,8 @@ impl Friction {
     /// stiction may act in either direction, and the fraction `relative_error` of it in fast sliding.
     #[inline]
     pub fn uncertainty_nm(&self, velocity_rad_per_s: f64, relative_error: f64) -> f64 {
-        let s = velocity_rad_per_s / self.stribeck_rad_per_s;
-        self.coulomb_nm * relative_error + self.breakaway_nm * exp(-s * s)
+        self.coulomb_nm * relative_error
+            + self.breakaway_nm * self.stribeck_share(velocity_rad_per_s)
     }
 
     /// Returns `D(v)`, the torque that overcomes friction at joint velocity `velocity_rad_per_s` \[N m\].
@@ -329,8 +329,14 @@ impl Friction {
         if self.stribeck_offset_nm == 0.0 {
             return self.offset_nm;
         }
+        self.offset_nm + self.stribeck_offset_nm * self.stribeck_share(velocity_rad_per_s)
+    }
+
+    /// Returns `e(v)`, the fraction of the Stribeck effect at this velocity, 0 to 1.
+    #[inline]
+    pub fn stribeck_share(&self, velocity_rad_per_s: f64) -> f64 {
         let s = velocity_rad_per_s / self.stribeck_rad_per_s;
-        self.offset_nm + self.stribeck_offset_nm * exp(-s * s)
+        exp(-s * s)
     }
 
     /// Returns the viscous part of `D(v)`, `[V + A p(v / delta)] v` \[N m\].
@@ -365,9 +371,13 @@ impl Friction {
     /// Returns the magnitude of the dry part of `D(v)`: Coulomb torque with the Stribeck effect \[N m\].
     #[inline]
     pub fn dry_size_nm(&self, velocity_rad_per_s: f64) -> f64 {
-        let s = velocity_rad_per_s / self.stribeck_rad_per_s;
         let dip = self.breakaway_nm - self.coulomb_nm;
-        self.coulomb_nm + if dip > 0.0 { dip * exp(-s * s) } else { 0.0 }
+        let rise = if dip > 0.0 {
+            dip * self.stribeck_share(velocity_rad_per_s)
+        } else {
+            0.0
+        };
+        self.coulomb_nm + rise
     }
 
     /// Returns `D(v)` with dry friction in the given direction, -1 to 1, multiplied by `share`, 0 to 1 \[N m\].

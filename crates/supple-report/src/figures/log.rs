@@ -13,6 +13,9 @@ const SIZE_PX: (u32, u32) = (760, 190);
 /// Maximum number of points of a curve. In a longer curve, each pair of points is the minimum and maximum of an interval.
 const MAX_POINTS: usize = 4000;
 
+/// A curve ends before an interval that is longer than this multiple of its median interval, and begins again after it.
+const GAP: f64 = 20.0;
+
 /// Points of a curve: time \[s\] and value.
 pub type Points = Vec<(f64, f64)>;
 
@@ -75,7 +78,9 @@ pub fn draw(
             let mut entries = Vec::new();
             for (index, curve) in panel.curves.iter().enumerate() {
                 let (colour, width_px) = stroke_of(index, panel.wide_first);
-                drawn.line(thinned(&curve.points), colour, width_px)?;
+                for part in without_gaps(&curve.points) {
+                    drawn.line(thinned(part), colour, width_px)?;
+                }
                 entries.push((curve.name, LegendSymbol::Line(width_px), colour));
             }
             legend(&area, (360.0, 14.0), &entries)?;
@@ -92,6 +97,22 @@ fn stroke_of(index: usize, wide_first: bool) -> (RGBColor, f64) {
         (true, _) => (COLOURS[(index - 1) % COLOURS.len()], 1.2),
         (false, _) => (COLOURS[index % COLOURS.len()], 1.2),
     }
+}
+
+/// Divides a curve where it has no points for a while.
+fn without_gaps(points: &[(f64, f64)]) -> impl Iterator<Item = &[(f64, f64)]> {
+    let mut intervals: Vec<f64> = (points.windows(2))
+        .map(|pair| pair[1].0 - pair[0].0)
+        .collect();
+    let gap_s = match intervals.len() {
+        0 => f64::INFINITY,
+        count => {
+            GAP * *intervals
+                .select_nth_unstable_by(count / 2, f64::total_cmp)
+                .1
+        }
+    };
+    points.chunk_by(move |a, b| b.0 - a.0 <= gap_s)
 }
 
 /// Thins a curve out: divides it into intervals of equal numbers of points, and keeps minimum and maximum of each, in order.
@@ -117,6 +138,18 @@ fn thinned(points: &[(f64, f64)]) -> Points {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_curve_is_not_drawn_over_a_gap() {
+        let at = |k: i32| (1e-3 * f64::from(k), 1.0);
+        let points: Points = (0..500).chain(900..1200).map(at).collect();
+        let parts: Vec<_> = without_gaps(&points).collect();
+        assert_eq!(parts, [&points[..500], &points[500..]]);
+        // A few lost cycles are no gap.
+        let points: Points = (0..500).chain(510..600).map(at).collect();
+        assert_eq!(without_gaps(&points).count(), 1);
+        assert_eq!(without_gaps(&points[..1]).count(), 1);
+    }
 
     #[test]
     fn thinning_keeps_peaks_and_order() {

@@ -109,7 +109,7 @@ impl FullOutput {
         match self {
             FullOutput::Log(file) => Up::start(
                 &UpArgs {
-                    log: file.clone(),
+                    log: Some(file.clone()),
                     no_log: false,
                     ..up.clone()
                 },

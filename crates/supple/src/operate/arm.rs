@@ -1,7 +1,7 @@
 //! Determines the arm for a command to a running system.
 
 use crate::cli::SystemArgs;
-use crate::up::running_arm;
+use crate::up::RunningSystem;
 use supple_cli::arguments::UrdfArgs;
 use supple_cli::arms::DEFAULT_ARM;
 use supple_cli::exit::Failure;
@@ -11,8 +11,13 @@ use supple_model::Description;
 
 /// Returns the arm for a command to a running system: the given arm, or the arm of its `supple up`.
 pub fn arm_of(domain: &Domain, given: Option<&str>, urdf: &UrdfArgs) -> String {
-    let of_system = || running_arm(domain).unwrap_or_else(|| DEFAULT_ARM.to_owned());
+    let of_system = || arm_of_running(domain).unwrap_or_else(|| DEFAULT_ARM.to_owned());
     urdf.name(&given.map_or_else(of_system, str::to_owned))
+}
+
+/// Returns the arm of a running system in the form for `--arm`; `None` if the system was not started by `supple up`.
+fn arm_of_running(domain: &Domain) -> Option<String> {
+    RunningSystem::of(domain)?.arm
 }
 
 /// Returns the arm as [`arm_of`] does, from the prefix of the system.
@@ -39,7 +44,7 @@ pub(super) fn check_arm(
     description: &Description,
     telemetry: &Telemetry,
 ) -> Result<(), Failure> {
-    let named = running_arm(domain);
+    let named = arm_of_running(domain);
     let joints = usize::from(telemetry.state.dof);
     let differs = |joints: String, running: String| Failure::OtherArm {
         arm: arm.to_owned(),

@@ -31,7 +31,7 @@ use crate::cli::{
     GainsArgs, ModeArgs, ModeName, StopArgs, SystemArgs, TrackArgs, TrackTarget, TrackTrajectory,
     UpTrajectory,
 };
-use crate::up::stop_running;
+use crate::up::RunningSystem;
 use core::time::Duration;
 use serde::Serialize;
 use std::time::Instant;
@@ -54,10 +54,14 @@ const CAP_M: f64 = 0.02;
 /// Interval at which the command checks for the pidfile of a running system.
 const PIDFILE_INTERVAL: Duration = Duration::from_millis(20);
 
-/// Result of `supple stop`, as `--json` prints it: the prefix of the system whose shutdown was requested.
+/// Time after which `supple stop` says for what it waits.
+const SILENT_WAIT: Duration = Duration::from_secs(1);
+
+/// Result of `supple stop`, as `--json` prints it: the prefix of the system whose shutdown was requested, and whether it has ended.
 #[derive(Serialize)]
 struct StopResult<'a> {
     stopping: &'a str,
+    ended: bool,
 }
 
 /// Runs `supple mode`.
@@ -273,7 +277,10 @@ pub fn stop(args: &StopArgs) -> Result<(), Failure> {
     let system = &args.system;
     let domain = Domain::new(system.prefix.as_deref()).map_err(Failure::system)?;
     let start = Instant::now();
-    while !stop_running(&domain, args.supported)? {
+    let running = loop {
+        if let Some(running) = RunningSystem::of(&domain) {
+            break running;
+        }
         // `supple up` creates its pidfile again if another program has removed it.
         if !idle_socket_is_open(&domain) || start.elapsed() > TELEMETRY_TIMEOUT {
             return Err(Failure::NotRunning {
@@ -281,12 +288,35 @@ pub fn stop(args: &StopArgs) -> Result<(), Failure> {
             });
         }
         pause(PIDFILE_INTERVAL);
+    };
+    running.terminate(args.supported)?;
+    if running.held_until_supported && !args.supported {
+        print_status(
+            "the arm is held: support it, then run `supple stop --supported`, which releases it",
+        );
+    } else if !args.no_wait {
+        wait_for_end(&running);
     }
     match system.json {
         true => print_json(&StopResult {
             stopping: domain.prefix(),
+            ended: !running.runs(),
         }),
         false => Ok(()),
+    }
+}
+
+fn wait_for_end(running: &RunningSystem) {
+    let start = Instant::now();
+    let mut silent = true;
+    while running.runs() {
+        if silent && start.elapsed() > SILENT_WAIT {
+            silent = false;
+            print_status(
+                "waiting for the end of the system; an arm without brakes is laid down first (Ctrl-C ends only the waiting)",
+            );
+        }
+        pause(PIDFILE_INTERVAL);
     }
 }
 

@@ -277,7 +277,10 @@ impl<const N: usize> OperatorSession<N> {
 }
 
 fn refused(reply: &OperatorReply) -> Failure {
+    let text = reply.text.to_string();
+    // The failure itself says that the request was refused.
+    let reason = text.strip_prefix("refused: ").unwrap_or(&text);
     Failure::Refused {
-        reason: reply.text.to_string(),
+        reason: reason.to_owned(),
     }
 }

@@ -130,7 +130,7 @@ impl MovedArm<'_> {
         let up = self.up_args()?;
         let starts = on != CalibrationPlant::Running;
         let _pidfile = starts
-            .then(|| Pidfile::create(&self.domain, &up.arm))
+            .then(|| Pidfile::create(&self.domain, &up.arm, false))
             .transpose()?;
         let mut running = RunningArm::<N>::new(&up, starts, arm, &self.domain, self.out, stop)?;
         let result = work.perform(&mut running, &start, &mut terminal);
@@ -208,7 +208,7 @@ impl MovedArm<'_> {
             rate_hz: None,
             for_s: None,
             virtual_time: args.virtual_time,
-            log: PathBuf::new(),
+            log: None,
             no_log: true,
             prefix: args.prefix.clone(),
             view: false,

@@ -229,22 +229,31 @@ fn ended(name: &'static str, status: ExitStatus) -> Failure {
     }
 }
 
-/// File with the PID of the process that runs the system, for `supple stop`, and in its second line the system's arm; a lock
-/// on it excludes a second process.
+/// Third line of the pidfile of a system that ends by holding its arm.
+const HELD_UNTIL_SUPPORTED: &str = "held until supported";
+
+/// File with the PID of the process that runs the system, for `supple stop`, in its second line the system's arm, and in a third line
+/// whether the system ends by holding its arm; a lock on it excludes a second process.
 #[derive(Debug)]
 pub struct Pidfile {
     domain: Domain,
     arm: String,
+    held_until_supported: bool,
     path: PathBuf,
     locked: File,
 }
 
 impl Pidfile {
-    /// Creates and locks the file for a system that this process runs with the arm of this name.
+    /// Creates and locks the file for a system that this process runs with the arm of this name; `held_until_supported` as in `supple up
+    /// --hold-until-supported`.
     ///
     /// # Errors
     /// [`Failure::AlreadyRunning`], [`Failure::File`].
-    pub fn create(domain: &Domain, arm: &str) -> Result<Pidfile, Failure> {
+    pub fn create(
+        domain: &Domain,
+        arm: &str,
+        held_until_supported: bool,
+    ) -> Result<Pidfile, Failure> {
         let path = pidfile_path(domain);
         let failed = |error: io::Error| Failure::file("write", &path, error);
         let start = Instant::now();
@@ -275,11 +284,16 @@ impl Pidfile {
                 continue;
             }
             file.set_len(0).map_err(failed)?;
-            file.write_all(format!("{}\n{arm}\n", std::process::id()).as_bytes())
-                .map_err(failed)?;
+            let mut text = format!("{}\n{arm}\n", std::process::id());
+            if held_until_supported {
+                text += HELD_UNTIL_SUPPORTED;
+                text.push('\n');
+            }
+            file.write_all(text.as_bytes()).map_err(failed)?;
             return Ok(Pidfile {
                 domain: domain.clone(),
                 arm: arm.to_owned(),
+                held_until_supported,
                 path,
                 locked: file,
             });
@@ -293,7 +307,8 @@ impl Pidfile {
     pub fn restore(&mut self) {
         let is_gone = |error: io::Error| error.kind() == io::ErrorKind::NotFound;
         if fs::symlink_metadata(&self.path).is_err_and(is_gone)
-            && let Ok(mut replacement) = Pidfile::create(&self.domain, &self.arm)
+            && let Ok(mut replacement) =
+                Pidfile::create(&self.domain, &self.arm, self.held_until_supported)
         {
             // `replacement` now holds the old lock and is dropped; it must not remove the new file.
             std::mem::swap(&mut self.locked, &mut replacement.locked);
@@ -313,39 +328,60 @@ fn pidfile_path(domain: &Domain) -> PathBuf {
     domain.folder().join(format!("{}.pid", domain.prefix()))
 }
 
-/// Terminates the `supple up` of a system; with `supported`, declares that its arm is supported. Returns false if there is none.
-///
-/// # Errors
-/// [`Failure::File`].
-pub fn stop_running(domain: &Domain, supported: bool) -> Result<bool, Failure> {
-    let path = pidfile_path(domain);
-    let Some(process) = running(&path) else {
-        return Ok(false);
-    };
-    let declare = || {
-        pause(DECLARE_DELAY);
-        kill_process(process, Signal::USR1)
-    };
-    kill_process(process, Signal::TERM)
-        .and_then(|()| if supported { declare() } else { Ok(()) })
-        .map(|()| true)
-        .map_err(|error| Failure::file("end the process of", &path, error.into()))
+/// A running `supple up`, or another command that runs a system.
+#[derive(Debug)]
+pub struct RunningSystem {
+    pidfile: PathBuf,
+    process: Pid,
+    /// Arm in the form for `--arm`; `None` if the pidfile does not contain it.
+    pub arm: Option<String>,
+    /// Whether the arm is held at the end until somebody declares that it is supported.
+    pub held_until_supported: bool,
 }
 
-/// Returns the arm of a running system in the form for `--arm`; `None` if the system was not started by `supple up`.
-pub fn running_arm(domain: &Domain) -> Option<String> {
-    let path = pidfile_path(domain);
-    running(&path)?;
-    let text = fs::read_to_string(path).ok()?;
-    text.lines().nth(1).map(str::to_owned)
-}
+impl RunningSystem {
+    /// Returns the process that runs the system of this domain; `None` if there is none.
+    pub fn of(domain: &Domain) -> Option<RunningSystem> {
+        let pidfile = pidfile_path(domain);
+        let text = fs::read_to_string(&pidfile).ok()?;
+        let mut lines = text.lines();
+        let process = Pid::from_raw(lines.next()?.trim().parse().ok()?)?;
+        let system = RunningSystem {
+            pidfile,
+            process,
+            arm: lines.next().map(str::to_owned),
+            held_until_supported: lines.next() == Some(HELD_UNTIL_SUPPORTED),
+        };
+        system.runs().then_some(system)
+    }
 
-/// Returns the PID of the running `supple up` from the file; `None` if the PID now belongs to another program.
-fn running(path: &Path) -> Option<Pid> {
-    let line = first_line(path)?;
-    let process = Pid::from_raw(line.parse().ok()?)?;
-    let name = fs::read_to_string(format!("/proc/{line}/comm")).ok()?;
-    (name.trim() == "supple").then_some(process)
+    /// Terminates the process; with `supported`, declares that the arm is supported.
+    ///
+    /// # Errors
+    /// [`Failure::File`].
+    pub fn terminate(&self, supported: bool) -> Result<(), Failure> {
+        let declare = || {
+            pause(DECLARE_DELAY);
+            kill_process(self.process, Signal::USR1)
+        };
+        kill_process(self.process, Signal::TERM)
+            .and_then(|()| if supported { declare() } else { Ok(()) })
+            .map_err(|error| Failure::file("end the process of", &self.pidfile, error.into()))
+    }
+
+    /// Whether the process still runs; not if its PID now belongs to another program, and not if it has ended and its parent has not yet
+    /// asked for its exit code.
+    pub fn runs(&self) -> bool {
+        let stat = format!("/proc/{}/stat", self.process.as_raw_nonzero());
+        let Ok(stat) = fs::read_to_string(stat) else {
+            return false;
+        };
+        // PID (name) state ...; a name may contain a parenthesis.
+        let Some((before, after)) = stat.rsplit_once(") ") else {
+            return false;
+        };
+        before.split_once('(').map(|(_, name)| name) == Some("supple") && !after.starts_with('Z')
+    }
 }
 
 fn first_line(path: &Path) -> Option<String> {
@@ -361,13 +397,14 @@ mod tests {
     fn a_removed_pidfile_is_created_again_and_locked() {
         let folder = tempfile::tempdir().expect("a folder");
         let domain = Domain::in_folder(&folder.path().join("run"), "pid").expect("a domain");
-        let mut pidfile = Pidfile::create(&domain, "my arm").expect("created");
+        let mut pidfile = Pidfile::create(&domain, "my arm", true).expect("created");
         let path = pidfile_path(&domain);
         fs::remove_file(&path).expect("removed");
         pidfile.restore();
         let text = fs::read_to_string(&path).expect("there again");
-        assert_eq!(text, format!("{}\nmy arm\n", std::process::id()));
-        let second = Pidfile::create(&domain, "wam4");
+        let process = std::process::id();
+        assert_eq!(text, format!("{process}\nmy arm\nheld until supported\n"));
+        let second = Pidfile::create(&domain, "wam4", false);
         assert!(matches!(second, Err(Failure::AlreadyRunning { .. })));
         drop(pidfile);
         assert!(!path.exists());

@@ -17,7 +17,7 @@ mod status_line;
 mod system;
 mod viewer;
 
-pub use children::{ChildProcesses, Pidfile, running_arm, stop_running};
+pub use children::{ChildProcesses, Pidfile, RunningSystem};
 pub use plan::{CONTROLLER, Plan, SHUTDOWN_TIMEOUT};
 pub use recorder::Recorder;
 pub use start_up::{GRAVITY_HOLD_S, START_S};
@@ -34,6 +34,9 @@ use supple_cli::sibling::program_beside;
 use supple_ipc::Domain;
 use supple_model::{Description, with_dof};
 use viewer::Viewer;
+
+/// Delay of a process above which a stall of the machine may have caused a fault \[us\].
+const STALL_US: f64 = 2000.0;
 
 /// Runs `supple up`.
 ///
@@ -71,7 +74,10 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     let domain = Domain::new(args.prefix.as_deref()).map_err(Failure::system)?;
     write_stderr_in_background();
     let stop = interrupt::shutdown_on_interrupt();
-    let mut pidfile = Pidfile::create(&domain, &args.arm)?;
+    let mut pidfile = Pidfile::create(&domain, &args.arm, args.hold_until_supported)?;
+    if args.log.is_none() && !args.no_log {
+        outputs::keep_previous_log()?;
+    }
     let mut system = System::<N>::new(args, description, &domain)?;
     let started = system.start(description);
     let viewer = match (&started, args.view) {
@@ -90,10 +96,20 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     let fault = (!summary.faults.is_empty()).then(|| Failure::RunFault {
         faults: summary.faults.join("; "),
     });
+    if (fault.is_some() || result.is_err())
+        && args.stalls_matter()
+        && summary.wake_us.max > STALL_US
+    {
+        print_status(&format!(
+            "this machine woke a process {:.1} ms late: a fault of replies or states that are missing may be its own; an emulated or \
+             simulated arm needs two free processors (`supple doctor`), or --virtual-time",
+            1e-3 * summary.wake_us.max
+        ));
+    }
     match (result.and(shut_down), &fault) {
         (Ok(()), _) => {}
         // The request was refused because of the fault; report the fault.
-        (Err(Failure::Refused { reason }), Some(_)) => print_status(&reason),
+        (Err(Failure::Refused { reason }), Some(_)) => print_status(&format!("refused: {reason}")),
         (Err(failure), fault) => {
             if let Some(fault) = fault {
                 print_status(&fault.to_string());
@@ -104,7 +120,7 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     if args.json {
         print_json(&summary)?;
     } else {
-        print_line(&summary.to_string())?;
+        print_line(summary.to_string().trim_end())?;
         if let (Some(log), None) = (args.log_file(), &incomplete) {
             print_status(&format!("log: {}", log.display()));
         }

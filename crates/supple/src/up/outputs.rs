@@ -5,11 +5,30 @@
 use std::fs::{File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
+use supple_cli::console::print_status;
 use supple_cli::exit::Failure;
 use supple_files::{check_output, open_output, with_suffix};
 
+/// The log of a run that names none.
+pub const DEFAULT_LOG: &str = "out/up.mcap";
+/// The log of the run before that.
+const PREVIOUS_LOG: &str = "out/up.previous.mcap";
 /// Suffix of a log that is being written.
 const PART: &str = ".part";
+
+/// Keeps the default log of the run before under another name.
+///
+/// # Errors
+/// [`Failure::File`].
+pub fn keep_previous_log() -> Result<(), Failure> {
+    let (log, previous) = (Path::new(DEFAULT_LOG), Path::new(PREVIOUS_LOG));
+    if !log.is_file() {
+        return Ok(());
+    }
+    std::fs::rename(log, previous).map_err(|error| Failure::file("replace", previous, error))?;
+    print_status(&format!("the log of the run before is {PREVIOUS_LOG}"));
+    Ok(())
+}
 
 /// Checks that both files can be written and that no log replaces the trace.
 ///

@@ -1,5 +1,6 @@
 //! Processes of a system and their command-line arguments.
 
+use super::outputs;
 use crate::cli::{PlantKind, UpArgs, UpTrajectory};
 use crate::operate::pendant::Pendant;
 use core::time::Duration;
@@ -194,7 +195,7 @@ impl UpArgs {
             rate_hz: None,
             for_s: None,
             virtual_time: false,
-            log: PathBuf::new(),
+            log: None,
             no_log: true,
             view: false,
             prefix: None,
@@ -203,9 +204,15 @@ impl UpArgs {
         }
     }
 
+    /// Whether a stall of this machine looks like a fault of the arm: of an arm that this machine simulates by the wall clock.
+    pub(super) fn stalls_matter(&self) -> bool {
+        !self.virtual_time && self.plant != PlantKind::Can
+    }
+
     /// Path of the log; `None` without a log.
     pub fn log_file(&self) -> Option<PathBuf> {
-        (!self.no_log).then(|| self.log.clone())
+        let default = || PathBuf::from(outputs::DEFAULT_LOG);
+        (!self.no_log).then(|| self.log.clone().unwrap_or_else(default))
     }
 
     /// Returns the arm at the requested rate.

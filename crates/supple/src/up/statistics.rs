@@ -178,37 +178,41 @@ fn percentiles(histogram: &Histogram<u64>, scale: f64) -> Percentiles {
     }
 }
 
+/// The result first, then how the cycles kept their time.
 impl fmt::Display for UpSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(
-            f,
-            "{} cycles, {} missed, {} late, {} frames lost",
-            self.cycles, self.missed, self.late, self.tx_lost
-        )?;
-        for (name, unit, s) in [
-            ("wake-up latency", "us", &self.wake_us),
-            ("step", "ns", &self.step_ns),
-            ("state to command", "us", &self.round_trip_us),
-        ] {
-            writeln!(
-                f,
-                "{name}: p50 {:.1}, p99 {:.1}, p99.9 {:.1}, max {:.1} {unit}",
-                s.p50, s.p99, s.p999, s.max
-            )?;
+        let mut row = |name: &str, value: String| writeln!(f, "{name:<27}{value}");
+        let error = match self.rms_error_m {
+            Some(error_m) => format!("{:.2} mm RMS", error_m * 1e3),
+            None => "nothing was tracked".to_owned(),
+        };
+        row("tip error while tracking", error)?;
+        let late = format!("{} of {} cycles", self.missed, self.cycles);
+        row("torque not in time", late)?;
+        if self.tx_lost > 0 {
+            row("CAN frames lost", self.tx_lost.to_string())?;
         }
         if self.clock_stall_ms > 0.0 {
-            writeln!(
-                f,
-                "simulated time was paused for {:.1} ms (host stalls)",
-                self.clock_stall_ms
-            )?;
+            let paused = format!("{:.1} ms, while the host stalled", self.clock_stall_ms);
+            row("simulated time paused for", paused)?;
         }
         if let Some(times) = self.times_real_time {
-            writeln!(f, "{times:.1} times real time")?;
+            row("speed", format!("{times:.1} times real time"))?;
         }
-        match self.rms_error_m {
-            Some(error_m) => write!(f, "tip error while tracking: {:.2} mm RMS", error_m * 1e3),
-            None => write!(f, "nothing was tracked"),
+        let columns = |cells: [String; 4]| cells.map(|cell| format!("{cell:>10}")).concat();
+        let head = ["median", "99 %", "99.9 %", "maximum"].map(str::to_owned);
+        row("times (us)", columns(head))?;
+        for (name, scale, times) in [
+            ("  waking up for a cycle", 1.0, &self.wake_us),
+            ("  computing the torque", 1e-3, &self.step_ns),
+            ("  from state to torque", 1.0, &self.round_trip_us),
+        ] {
+            let each = [times.p50, times.p99, times.p999, times.max];
+            row(
+                name,
+                columns(each.map(|time| format!("{:.1}", scale * time))),
+            )?;
         }
+        Ok(())
     }
 }
