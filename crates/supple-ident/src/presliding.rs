@@ -3,7 +3,8 @@
 //! Within this travel a joint does not slide: its bearings and cables act as a spring, and the friction follows `p' = v (1 - p
 //! sign(v)) / d` (Dahl 1968) rather than the sign of the velocity. For each joint, `d` is selected from a list such that the
 //! model best explains the torque around every second reversal of the logs. It is accepted if it also explains the remaining
-//! reversals, which were not used for the selection, much better than a model without presliding.
+//! reversals, which were not used for the selection, much better than a model without presliding. All of the dry friction reverses over
+//! `d`, that of the load too: with a part that reverses at once, the other would seem to take longer.
 
 use crate::columns::Column;
 use crate::error::IdentError;
@@ -12,7 +13,7 @@ use crate::fit::Fit;
 use crate::motion::Motion;
 use crate::regressor::joint_rows;
 use nalgebra::DVector;
-use supple_core::Friction;
+use supple_core::{Friction, Vector};
 
 /// Candidate travels \[rad\].
 const TRAVELS_RAD: [f64; 12] = [
@@ -47,7 +48,11 @@ pub fn presliding_rad<const N: usize>(
     let parts = parts.collect::<Result<Vec<_>, _>>()?;
     let friction = fit.friction();
     for (row, &joint) in fit.columns.identified_joints().iter().enumerate() {
-        let dry = [Column::Coulomb(joint), Column::Stribeck(joint)];
+        let dry = [
+            Column::Coulomb(joint),
+            Column::Stribeck(joint),
+            Column::Load(joint),
+        ];
         let mut smooth = fit.x.clone();
         for position in dry
             .iter()
@@ -55,27 +60,41 @@ pub fn presliding_rad<const N: usize>(
         {
             smooth[position] = 0.0;
         }
+        let loads_nm = match fit.value(Column::Load(joint)) {
+            0.0 => vec![None; motions.len()],
+            _ => motions
+                .iter()
+                .map(|motion| Some(load_nm(fit, motion, joint)))
+                .collect(),
+        };
         // Torque that dry friction has to explain.
         let rest: Vec<DVector<f64>> = parts
             .iter()
             .map(|part| &part[row].b - &part[row].a * &smooth)
             .collect();
-        let [coulomb_nm, dip_nm] = dry.map(|column| fit.value(column));
         let reversals = reversals(motions, joint);
+        let [coulomb_nm, dip_nm, _] = dry.map(|column| fit.value(column));
         if reversals.len() < REVERSALS || coulomb_nm <= 0.0 {
             continue;
         }
         let errors = |travel_rad: f64| -> Result<[f64; 2], IdentError> {
-            // The friction of motors and the load-dependent friction are part of the rest of the model.
-            let law = Friction {
-                coulomb_nm,
-                breakaway_nm: coulomb_nm + dip_nm,
-                presliding_rad: travel_rad,
-                load_coefficient: 0.0,
-                coulomb_at_nm: 0.0,
-                ..friction[joint]
+            // The friction of motors is part of the rest of the model.
+            let law = match loads_nm.iter().any(Option::is_some) {
+                true => friction[joint],
+                false => Friction {
+                    coulomb_nm,
+                    breakaway_nm: coulomb_nm + dip_nm,
+                    load_coefficient: 0.0,
+                    coulomb_at_nm: 0.0,
+                    ..friction[joint]
+                },
             };
-            let dry = motions.iter().map(|motion| dry_nm(&law, motion, joint));
+            let law = Friction {
+                presliding_rad: travel_rad,
+                ..law
+            };
+            let dry = motions.iter().zip(&loads_nm);
+            let dry = dry.map(|(motion, load_nm)| dry_nm(&law, motion, joint, load_nm.as_deref()));
             let dry = dry.collect::<Result<Vec<_>, _>>()?;
             let mut sums = [0.0; 2];
             for (k, reversal) in reversals.iter().enumerate() {
@@ -107,17 +126,39 @@ pub fn presliding_rad<const N: usize>(
     Ok(found)
 }
 
-/// Returns the dry friction along a motion, filtered like its torques.
-fn dry_nm(law: &Friction, motion: &Motion, joint: usize) -> Result<Vec<f64>, IdentError> {
+/// Returns the torque that the joint carries along a motion, without its friction.
+fn load_nm<const N: usize>(fit: &Fit<N>, motion: &Motion, joint: usize) -> Vec<f64> {
+    let rest = Vector::<N>::zeros();
+    let offset_nm = fit.value(Column::Offset(joint)) + fit.value(Column::StribeckOffset(joint));
+    let at = |i: usize| {
+        let q = Vector::from_fn(|j, _| motion.q[(i, j)]);
+        fit.predict(&q, &rest, &rest)[joint] - offset_nm
+    };
+    (0..motion.samples()).map(at).collect()
+}
+
+/// Returns the dry friction along a motion in which the joint carries `load_nm`, filtered like its torques.
+fn dry_nm(
+    law: &Friction,
+    motion: &Motion,
+    joint: usize,
+    load_nm: Option<&[f64]>,
+) -> Result<Vec<f64>, IdentError> {
     let step_s = 1.0 / motion.rate_hz;
     let mut direction = 0.0;
     let speeds = motion.qd.column(joint);
-    let along = speeds.iter().map(|v| {
+    let along = speeds.iter().enumerate().map(|(i, v)| {
         direction = match law.presliding_rad > 0.0 {
             true => law.direction_after(direction, v * step_s),
             false => law.direction(*v),
         };
-        law.dry_size_nm(*v) * direction
+        match load_nm {
+            None => law.dry_size_nm(*v) * direction,
+            Some(load_nm) => {
+                let loaded = law.at_load(load_nm[i]);
+                loaded.dry_size_nm(*v) * direction + loaded.offset_nm - law.offset_nm
+            }
+        }
     });
     let along: Vec<f64> = along.collect();
     match motion.cutoff_hz {

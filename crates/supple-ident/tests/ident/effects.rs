@@ -359,56 +359,86 @@ fn learning_friction_keeps_the_springs() {
     assert_eq!(after.config::<4>().unwrap().learned, config.learned);
 }
 
+/// A motion in which every joint reverses, of an arm whose dry friction reverses over `travel_rad`; zero: with the velocity. Gears add
+/// `load_coefficient` of the torque that a joint carries.
+fn reversing_motion(config: &Config<4>, travel_rad: f64, load_coefficient: f64) -> Motion {
+    let (rate_hz, samples) = (200.0, 12_000);
+    let angle = |i: usize, j: usize| {
+        let t = i as f64 / rate_hz;
+        let f = 0.35 + 0.11 * j as f64;
+        (
+            0.5 * (f * t).sin(),
+            0.5 * f * (f * t).cos(),
+            -0.5 * f * f * (f * t).sin(),
+        )
+    };
+    let matrix =
+        |of: fn((f64, f64, f64)) -> f64| DMatrix::from_fn(samples, 4, |i, j| of(angle(i, j)));
+    let mut motion = Motion {
+        rate_hz,
+        q: matrix(|a| a.0),
+        qd: matrix(|a| a.1),
+        qdd: matrix(|a| a.2),
+        tau: DMatrix::zeros(samples, 4),
+        independent_fraction: 1.0,
+        cutoff_hz: None,
+        start_s: 0.0,
+        torque_delay_s: 0.0,
+        excluded_intervals: Vec::new(),
+    };
+    let mut direction = [0.0; 4];
+    for i in 0..samples {
+        let at = |m: &DMatrix<f64>| Vector::<4>::from_fn(|j, _| m[(i, j)]);
+        let (q, qd, qdd) = (at(&motion.q), at(&motion.qd), at(&motion.qdd));
+        let torque = supple_core::dynamics::rnea(&config.arm, &q, &qd, &qdd);
+        for j in ALL {
+            let law = Friction {
+                presliding_rad: travel_rad,
+                load_coefficient,
+                ..config.friction[j]
+            };
+            direction[j] = match travel_rad > 0.0 {
+                true => law.direction_after(direction[j], qd[j] / rate_hz),
+                false => law.direction(qd[j]),
+            };
+            let friction = law
+                .at_load(torque[j])
+                .torque_in_direction_nm(qd[j], direction[j], 1.0);
+            motion.tau[(i, j)] = torque[j] + friction;
+        }
+    }
+    motion
+}
+
 /// The fit finds the distance over which friction reverses; friction that follows the sign of the velocity has none.
 #[test]
 fn the_presliding_distance_is_found_if_the_arm_has_one() {
     let config = wam4();
-    let (rate_hz, samples) = (200.0, 12_000);
     for travel_rad in [0.0, 1e-3] {
-        let angle = |i: usize, j: usize| {
-            let t = i as f64 / rate_hz;
-            let f = 0.35 + 0.11 * j as f64;
-            (
-                0.5 * (f * t).sin(),
-                0.5 * f * (f * t).cos(),
-                -0.5 * f * f * (f * t).sin(),
-            )
-        };
-        let matrix =
-            |of: fn((f64, f64, f64)) -> f64| DMatrix::from_fn(samples, 4, |i, j| of(angle(i, j)));
-        let mut motion = Motion {
-            rate_hz,
-            q: matrix(|a| a.0),
-            qd: matrix(|a| a.1),
-            qdd: matrix(|a| a.2),
-            tau: DMatrix::zeros(samples, 4),
-            independent_fraction: 1.0,
-            cutoff_hz: None,
-            start_s: 0.0,
-            torque_delay_s: 0.0,
-            excluded_intervals: Vec::new(),
-        };
-        let mut direction = [0.0; 4];
-        for i in 0..samples {
-            let at = |m: &DMatrix<f64>| Vector::<4>::from_fn(|j, _| m[(i, j)]);
-            let (q, qd, qdd) = (at(&motion.q), at(&motion.qd), at(&motion.qdd));
-            let torque = supple_core::dynamics::rnea(&config.arm, &q, &qd, &qdd);
-            for j in ALL {
-                let law = Friction {
-                    presliding_rad: travel_rad,
-                    ..config.friction[j]
-                };
-                direction[j] = match travel_rad > 0.0 {
-                    true => law.direction_after(direction[j], qd[j] / rate_hz),
-                    false => law.direction(qd[j]),
-                };
-                let friction = law.torque_in_direction_nm(qd[j], direction[j], 1.0);
-                motion.tau[(i, j)] = torque[j] + friction;
-            }
-        }
-        let motions = [motion];
+        let motions = [reversing_motion(&config, travel_rad, 0.0)];
         let options = Options {
             consistent_prior_weight: Some(1e-4),
+            ..Options::default()
+        };
+        let found = fit(&config.arm, &motions, &ALL, &options).unwrap();
+        let travels = presliding_rad(&found, &motions).unwrap();
+        assert_eq!(travels, vec![travel_rad; 4]);
+    }
+}
+
+/// Friction by load reverses over the same distance. Shoulder and elbow carry several newton metres: their gears add 0.5 to 4 N m to
+/// dry friction of 0.6 to 2 N m.
+#[test]
+fn the_presliding_distance_is_that_of_all_dry_friction() {
+    let config = wam4();
+    for travel_rad in [7e-4, 2e-3] {
+        let motions = [reversing_motion(&config, travel_rad, 0.2)];
+        let options = Options {
+            consistent_prior_weight: Some(1e-4),
+            friction: FrictionColumns {
+                load: Some(LoadTorque::Joint),
+                ..FrictionColumns::COULOMB
+            },
             ..Options::default()
         };
         let found = fit(&config.arm, &motions, &ALL, &options).unwrap();

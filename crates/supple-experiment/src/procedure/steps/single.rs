@@ -74,7 +74,7 @@ pub fn track_arm<const N: usize, A: MotionArm<N>>(
     let start_rad = start_pose(&model, SINUSOID, &trajectory, period_s);
     let start_rad = start_rad.map_err(ProcedureError::from)?;
     let gains = Request::Gains {
-        gains: scenario::gains(scenario::STIFFNESS_N_PER_M),
+        gains: scenario::gains_like(&model.law.gains, scenario::STIFFNESS_N_PER_M),
         ramp_s: 0.5 * GAINS_S,
     };
     let steps = |from: &Vector<N>| {

@@ -71,16 +71,17 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
             return Ok(self.finish(StepName::Sinusoid, before_s, None)?);
         };
         self.ensure_model(ModelStage::Identified)?;
+        let config = config::<N>(&self.model(ModelStage::Identified)?)?;
         let (trajectory, duration_s) = self.start.paths().sinusoid(1.0);
         let track = |duration_s| Step {
             recorded: true,
             ..Step::wait(Request::Track(trajectory), duration_s)
         };
         let gains = Request::Gains {
-            gains: scenario::gains(scenario::STIFFNESS_N_PER_M),
+            gains: scenario::gains_like(&config.law.gains, scenario::STIFFNESS_N_PER_M),
             ramp_s: 0.5 * GAINS_S,
         };
-        let period_s = self.model(ModelStage::Identified)?.settings().period_s;
+        let period_s = config.period_s;
         let mut result = SinusoidResult::default();
         for learning in [false, true] {
             let (name, lead_s) = match learning {
