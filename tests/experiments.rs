@@ -412,7 +412,7 @@ fn openarm_and_yam_track_a_sinusoid_at_5_n_per_m() {
         let description = Description::asset(name).expect("a built-in arm");
         let setup = Setup::<N>::new(&description, 1).expect("its joints");
         let mut config = setup.config(&perturbed(seed)).expect("a physical model");
-        config.law.gains = scenario::gains(scenario::STIFFNESS_N_PER_M);
+        config.law.gains = scenario::gains_like(&config.law.gains, scenario::STIFFNESS_N_PER_M);
         let sinusoid = Sinusoid {
             centre_m: centre_m.into(),
             amplitude_m: [0.08, 0.0, 0.0].into(),

@@ -199,7 +199,8 @@ def started_processes(environment: dict[str, str]) -> Iterator[list[int]]:
         yield groups
     finally:
         if any(alive(group) for group in groups):
-            subprocess.run(["supple", "stop"], env=environment, capture_output=True, check=False)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                subprocess.run(["supple", "stop"], env=environment, capture_output=True, check=False, timeout=30.0)
         for number, seconds in ((signal.SIGTERM, 20.0), (signal.SIGKILL, 5.0)):
             left = [group for group in groups if alive(group)]
             for group in left:

@@ -13,7 +13,7 @@
 //! The factor of the upper bound covers nine tenths of the calibrations of simulated arms with random effects
 //! of real arms (`docs/verdict.md`).
 
-use crate::scenario::{STIFFNESS_N_PER_M, gains};
+use crate::scenario::{STIFFNESS_N_PER_M, gains_like};
 use crate::tracking_prediction::GOOD_M;
 use nalgebra::{DMatrix, Vector3};
 use serde::{Deserialize, Serialize};
@@ -186,7 +186,7 @@ fn sticking_nm<const N: usize>(config: &Config<N>, poses: &[Vector<N>], joint: u
         let x = (speed_rad_per_s / friction.stribeck_rad_per_s).max(steepest);
         excess_nm / friction.stribeck_rad_per_s * 2.0 * x * (-x * x).exp()
     };
-    let law_n_s_per_m = gains(STIFFNESS_N_PER_M).damping_n_s_per_m;
+    let law_n_s_per_m = gains_like(&config.law.gains, STIFFNESS_N_PER_M).damping_n_s_per_m;
     let damping_nm_s_per_rad = |pair: &[Vector<N>]| {
         let speed_rad_per_s = (pair[1][joint] - pair[0][joint]).abs() / REACH_CHECK_STEP_S;
         let columns = jacobian(&config.arm, &pair[1]);

@@ -47,6 +47,11 @@ pub fn presliding_rad<const N: usize>(
         .map(|motion| joint_rows(fit.nominal(), &fit.columns, motion));
     let parts = parts.collect::<Result<Vec<_>, _>>()?;
     let friction = fit.friction();
+    let loaded = friction.iter().any(|joint| joint.load_coefficient > 0.0);
+    let loads = motions
+        .iter()
+        .map(|motion| loaded.then(|| loads_nm(fit, motion)));
+    let loads_nm: Vec<Option<Vec<Vector<N>>>> = loads.collect();
     for (row, &joint) in fit.columns.identified_joints().iter().enumerate() {
         let dry = [
             Column::Coulomb(joint),
@@ -60,41 +65,28 @@ pub fn presliding_rad<const N: usize>(
         {
             smooth[position] = 0.0;
         }
-        let loads_nm = match fit.value(Column::Load(joint)) {
-            0.0 => vec![None; motions.len()],
-            _ => motions
-                .iter()
-                .map(|motion| Some(load_nm(fit, motion, joint)))
-                .collect(),
-        };
         // Torque that dry friction has to explain.
         let rest: Vec<DVector<f64>> = parts
             .iter()
             .map(|part| &part[row].b - &part[row].a * &smooth)
             .collect();
         let reversals = reversals(motions, joint);
+        // The friction of motors is part of the rest of the model.
         let [coulomb_nm, dip_nm, _] = dry.map(|column| fit.value(column));
+        let of_joint = friction[joint];
+        let coulomb_nm = coulomb_nm + of_joint.load_coefficient * of_joint.coulomb_at_nm;
         if reversals.len() < REVERSALS || coulomb_nm <= 0.0 {
             continue;
         }
         let errors = |travel_rad: f64| -> Result<[f64; 2], IdentError> {
-            // The friction of motors is part of the rest of the model.
-            let law = match loads_nm.iter().any(Option::is_some) {
-                true => friction[joint],
-                false => Friction {
-                    coulomb_nm,
-                    breakaway_nm: coulomb_nm + dip_nm,
-                    load_coefficient: 0.0,
-                    coulomb_at_nm: 0.0,
-                    ..friction[joint]
-                },
-            };
             let law = Friction {
+                coulomb_nm,
+                breakaway_nm: coulomb_nm + dip_nm,
                 presliding_rad: travel_rad,
-                ..law
+                ..of_joint
             };
             let dry = motions.iter().zip(&loads_nm);
-            let dry = dry.map(|(motion, load_nm)| dry_nm(&law, motion, joint, load_nm.as_deref()));
+            let dry = dry.map(|(motion, loads)| dry_nm(&law, motion, joint, loads.as_ref()));
             let dry = dry.collect::<Result<Vec<_>, _>>()?;
             let mut sums = [0.0; 2];
             for (k, reversal) in reversals.iter().enumerate() {
@@ -126,23 +118,26 @@ pub fn presliding_rad<const N: usize>(
     Ok(found)
 }
 
-/// Returns the torque that the joint carries along a motion, without its friction.
-fn load_nm<const N: usize>(fit: &Fit<N>, motion: &Motion, joint: usize) -> Vec<f64> {
+/// Returns the torque that the joints carry at rest along a motion, without their friction: the load by which the controller computes their
+/// friction. The columns of the fit have the load of the motion itself.
+fn loads_nm<const N: usize>(fit: &Fit<N>, motion: &Motion) -> Vec<Vector<N>> {
     let rest = Vector::<N>::zeros();
-    let offset_nm = fit.value(Column::Offset(joint)) + fit.value(Column::StribeckOffset(joint));
+    let offset = |column: Column| fit.value(column);
+    let offset_nm =
+        Vector::<N>::from_fn(|j, _| offset(Column::Offset(j)) + offset(Column::StribeckOffset(j)));
     let at = |i: usize| {
         let q = Vector::from_fn(|j, _| motion.q[(i, j)]);
-        fit.predict(&q, &rest, &rest)[joint] - offset_nm
+        fit.predict(&q, &rest, &rest) - offset_nm
     };
     (0..motion.samples()).map(at).collect()
 }
 
-/// Returns the dry friction along a motion in which the joint carries `load_nm`, filtered like its torques.
-fn dry_nm(
+/// Returns the dry friction along a motion in which the joints carry `loads_nm`, filtered like its torques.
+fn dry_nm<const N: usize>(
     law: &Friction,
     motion: &Motion,
     joint: usize,
-    load_nm: Option<&[f64]>,
+    loads_nm: Option<&Vec<Vector<N>>>,
 ) -> Result<Vec<f64>, IdentError> {
     let step_s = 1.0 / motion.rate_hz;
     let mut direction = 0.0;
@@ -152,10 +147,10 @@ fn dry_nm(
             true => law.direction_after(direction, v * step_s),
             false => law.direction(*v),
         };
-        match load_nm {
+        match loads_nm {
             None => law.dry_size_nm(*v) * direction,
-            Some(load_nm) => {
-                let loaded = law.at_load(load_nm[i]);
+            Some(loads_nm) => {
+                let loaded = law.at_load(loads_nm[i][joint]);
                 loaded.dry_size_nm(*v) * direction + loaded.offset_nm - law.offset_nm
             }
         }

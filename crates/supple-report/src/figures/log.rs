@@ -78,8 +78,9 @@ pub fn draw(
             let mut entries = Vec::new();
             for (index, curve) in panel.curves.iter().enumerate() {
                 let (colour, width_px) = stroke_of(index, panel.wide_first);
+                let size = curve.points.len().div_ceil(MAX_POINTS / 2);
                 for part in without_gaps(&curve.points) {
-                    drawn.line(thinned(part), colour, width_px)?;
+                    drawn.line(thinned(part, size), colour, width_px)?;
                 }
                 entries.push((curve.name, LegendSymbol::Line(width_px), colour));
             }
@@ -115,9 +116,8 @@ fn without_gaps(points: &[(f64, f64)]) -> impl Iterator<Item = &[(f64, f64)]> {
     points.chunk_by(move |a, b| b.0 - a.0 <= gap_s)
 }
 
-/// Thins a curve out: divides it into intervals of equal numbers of points, and keeps minimum and maximum of each, in order.
-fn thinned(points: &[(f64, f64)]) -> Points {
-    let size = points.len().div_ceil(MAX_POINTS / 2);
+/// Thins a curve out: divides it into intervals of `size` points, and keeps minimum and maximum of each, in order.
+fn thinned(points: &[(f64, f64)], size: usize) -> Points {
     if size <= 2 {
         return points.to_vec();
     }
@@ -156,12 +156,12 @@ mod tests {
         let mut points: Points = (0..100_000).map(|k| (f64::from(k), 0.0)).collect();
         points[12_345].1 = 7.0;
         points[54_321].1 = -3.0;
-        let thinned = thinned(&points);
+        let thinned = thinned(&points, 50);
         assert!(thinned.len() <= MAX_POINTS, "{}", thinned.len());
         for peak in [(12_345.0, 7.0), (54_321.0, -3.0)] {
             assert!(thinned.contains(&peak), "{peak:?}");
         }
         assert!(thinned.windows(2).all(|pair| pair[0].0 <= pair[1].0));
-        assert_eq!(super::thinned(&points[..100]), points[..100]);
+        assert_eq!(super::thinned(&points[..100], 1), points[..100]);
     }
 }

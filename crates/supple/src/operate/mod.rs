@@ -54,6 +54,9 @@ const CAP_M: f64 = 0.02;
 /// Interval at which the command checks for the pidfile of a running system.
 const PIDFILE_INTERVAL: Duration = Duration::from_millis(20);
 
+/// Interval at which `supple stop --supported` repeats its declaration.
+const DECLARE_INTERVAL: Duration = Duration::from_millis(500);
+
 /// Time after which `supple stop` says for what it waits.
 const SILENT_WAIT: Duration = Duration::from_secs(1);
 
@@ -93,7 +96,7 @@ fn idle(system: &SystemArgs) -> Result<(), Failure> {
     let domain = Domain::new(system.prefix.as_deref()).map_err(Failure::system)?;
     match request_idle(&domain, TELEMETRY_TIMEOUT) {
         Ok(Some(answer)) if answer.outcome == Outcome::Refused => Err(Failure::Refused {
-            reason: answer.text,
+            reason: session::reason_of(&answer.text),
         }),
         Ok(Some(answer)) => print_mode(system, answer.mode, answer.cycle),
         Ok(None) => idle_as_any_request(system, &domain, None),
@@ -295,7 +298,7 @@ pub fn stop(args: &StopArgs) -> Result<(), Failure> {
             "the arm is held: support it, then run `supple stop --supported`, which releases it",
         );
     } else if !args.no_wait {
-        wait_for_end(&running);
+        wait_for_end(&running, args.supported)?;
     }
     match system.json {
         true => print_json(&StopResult {
@@ -306,18 +309,32 @@ pub fn stop(args: &StopArgs) -> Result<(), Failure> {
     }
 }
 
-fn wait_for_end(running: &RunningSystem) {
+/// Waits until a system has ended. That its arm is supported is declared again and again: a system that is only beginning to end forgets
+/// what was declared before.
+fn wait_for_end(running: &RunningSystem, supported: bool) -> Result<(), Failure> {
+    let releases = supported && running.held_until_supported;
     let start = Instant::now();
-    let mut silent = true;
+    let (mut silent, mut declared) = (true, start);
     while running.runs() {
+        if releases && declared.elapsed() > DECLARE_INTERVAL {
+            declared = Instant::now();
+            running.declare_supported()?;
+        }
         if silent && start.elapsed() > SILENT_WAIT {
             silent = false;
-            print_status(
-                "waiting for the end of the system; an arm without brakes is laid down first (Ctrl-C ends only the waiting)",
-            );
+            print_status(match releases {
+                true => {
+                    "waiting until the torque of the supported arm has faded (Ctrl-C ends only the waiting)"
+                }
+                false => {
+                    "waiting for the end of the system: an arm without brakes is laid down first, and a procedure may compute or \
+                     wait for an answer (Ctrl-C ends only the waiting)"
+                }
+            });
         }
         pause(PIDFILE_INTERVAL);
     }
+    Ok(())
 }
 
 #[cfg(test)]

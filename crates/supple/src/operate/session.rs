@@ -277,10 +277,12 @@ impl<const N: usize> OperatorSession<N> {
 }
 
 fn refused(reply: &OperatorReply) -> Failure {
-    let text = reply.text.to_string();
-    // The failure itself says that the request was refused.
-    let reason = text.strip_prefix("refused: ").unwrap_or(&text);
     Failure::Refused {
-        reason: reason.to_owned(),
+        reason: reason_of(&reply.text.to_string()),
     }
+}
+
+/// Returns the reason in the text of an answer: the failure itself says that the request was refused.
+pub(super) fn reason_of(text: &str) -> String {
+    text.strip_prefix("refused: ").unwrap_or(text).to_owned()
 }

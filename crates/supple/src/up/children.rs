@@ -360,13 +360,29 @@ impl RunningSystem {
     /// # Errors
     /// [`Failure::File`].
     pub fn terminate(&self, supported: bool) -> Result<(), Failure> {
-        let declare = || {
+        self.send(Signal::TERM)?;
+        if supported {
             pause(DECLARE_DELAY);
-            kill_process(self.process, Signal::USR1)
-        };
-        kill_process(self.process, Signal::TERM)
-            .and_then(|()| if supported { declare() } else { Ok(()) })
-            .map_err(|error| Failure::file("end the process of", &self.pidfile, error.into()))
+            self.declare_supported()?;
+        }
+        Ok(())
+    }
+
+    /// Declares that the arm is supported.
+    ///
+    /// # Errors
+    /// [`Failure::File`].
+    pub fn declare_supported(&self) -> Result<(), Failure> {
+        self.send(Signal::USR1)
+    }
+
+    /// Sends a signal, unless the process has ended.
+    fn send(&self, signal: Signal) -> Result<(), Failure> {
+        match kill_process(self.process, signal) {
+            Err(Errno::SRCH) => Ok(()),
+            sent => sent
+                .map_err(|error| Failure::file("end the process of", &self.pidfile, error.into())),
+        }
     }
 
     /// Whether the process still runs; not if its PID now belongs to another program, and not if it has ended and its parent has not yet

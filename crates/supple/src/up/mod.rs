@@ -75,10 +75,10 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     write_stderr_in_background();
     let stop = interrupt::shutdown_on_interrupt();
     let mut pidfile = Pidfile::create(&domain, &args.arm, args.hold_until_supported)?;
-    if args.log.is_none() && !args.no_log {
-        outputs::keep_previous_log()?;
-    }
     let mut system = System::<N>::new(args, description, &domain)?;
+    if args.log.is_none() && !args.no_log {
+        outputs::keep_previous_log();
+    }
     let started = system.start(description);
     let viewer = match (&started, args.view) {
         (Ok(()), true) => Viewer::start(args, &domain).map(Some),
@@ -96,10 +96,7 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     let fault = (!summary.faults.is_empty()).then(|| Failure::RunFault {
         faults: summary.faults.join("; "),
     });
-    if (fault.is_some() || result.is_err())
-        && args.stalls_matter()
-        && summary.wake_us.max > STALL_US
-    {
+    if summary.lost_in_time && args.stalls_matter() && summary.wake_us.max > STALL_US {
         print_status(&format!(
             "this machine woke a process {:.1} ms late: a fault of replies or states that are missing may be its own; an emulated or \
              simulated arm needs two free processors (`supple doctor`), or --virtual-time",

@@ -17,17 +17,17 @@ const PREVIOUS_LOG: &str = "out/up.previous.mcap";
 const PART: &str = ".part";
 
 /// Keeps the default log of the run before under another name.
-///
-/// # Errors
-/// [`Failure::File`].
-pub fn keep_previous_log() -> Result<(), Failure> {
-    let (log, previous) = (Path::new(DEFAULT_LOG), Path::new(PREVIOUS_LOG));
+pub fn keep_previous_log() {
+    let log = Path::new(DEFAULT_LOG);
     if !log.is_file() {
-        return Ok(());
+        return;
     }
-    std::fs::rename(log, previous).map_err(|error| Failure::file("replace", previous, error))?;
-    print_status(&format!("the log of the run before is {PREVIOUS_LOG}"));
-    Ok(())
+    print_status(&match std::fs::rename(log, PREVIOUS_LOG) {
+        Ok(()) => format!("the log of the run before is {PREVIOUS_LOG}"),
+        Err(error) => format!(
+            "warning: {DEFAULT_LOG} will be replaced, since it cannot become {PREVIOUS_LOG}: {error}"
+        ),
+    });
 }
 
 /// Checks that both files can be written and that no log replaces the trace.

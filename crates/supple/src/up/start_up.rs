@@ -293,7 +293,10 @@ impl StartUp {
         match held {
             Ok(reply) => self.stage = Stage::GravityHold(reply.cycle),
             Err(Failure::Refused { reason }) if !in_fault => {
-                self.end(&format!("because gravity hold was {reason}"), false);
+                self.end(
+                    &format!("because gravity hold was refused: {reason}"),
+                    false,
+                );
                 return Ok(());
             }
             Err(failure) => return Err(failure),

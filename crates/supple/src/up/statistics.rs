@@ -3,6 +3,7 @@
 use core::fmt;
 use hdrhistogram::Histogram;
 use serde::Serialize;
+use supple_core::codes::fault_kind;
 use supple_core::controller::Mode;
 use supple_ipc::message::{PlantReport, Telemetry};
 
@@ -25,6 +26,7 @@ pub struct RunStatistics {
     tracked: u64,
     fault: u8,
     faults: Vec<String>,
+    lost_in_time: bool,
 }
 
 /// Percentiles of a distribution.
@@ -74,6 +76,9 @@ pub struct UpSummary {
     pub tracked_cycles: u64,
     /// Descriptions of the faults that latched.
     pub faults: Vec<String>,
+    /// Whether a fault latched because states or replies were missing, as they also are if the machine stalls.
+    #[serde(skip)]
+    pub lost_in_time: bool,
     /// Reason why the log or the trace is incomplete; none if both are complete.
     pub incomplete_output: Option<String>,
     /// Real-time factor: simulated time over wall-clock time; none in real time.
@@ -96,6 +101,7 @@ impl Default for RunStatistics {
             tracked: 0,
             fault: 0,
             faults: Vec::new(),
+            lost_in_time: false,
         }
     }
 }
@@ -124,6 +130,12 @@ impl RunStatistics {
     pub fn note_fault(&mut self, telemetry: &Telemetry) {
         if telemetry.record().fault != self.fault && telemetry.record().fault != 0 {
             self.faults.push(telemetry.record().fault_text.to_string());
+            let kinds = [
+                fault_kind::STATE_STALE,
+                fault_kind::ENCODER_LOST,
+                fault_kind::ENCODER_UNRELIABLE,
+            ];
+            self.lost_in_time |= kinds.contains(&telemetry.record().fault);
         }
         self.fault = telemetry.record().fault;
     }
@@ -162,6 +174,7 @@ impl RunStatistics {
             rms_error_m: mean(self.squared_error_m2, self.tracked).map(f64::sqrt),
             tracked_cycles: self.tracked,
             faults: self.faults.clone(),
+            lost_in_time: self.lost_in_time,
             incomplete_output: None,
             times_real_time: None,
         }

@@ -226,7 +226,7 @@ impl<'a, const N: usize> System<'a, N> {
             }
             let polled = match self.poll_and_advance() {
                 Err(Failure::Refused { reason }) if self.wait_whether_start_up_aborts()? => {
-                    print_status(&reason);
+                    print_status(&format!("refused: {reason}"));
                     continue;
                 }
                 polled => polled?,
@@ -247,7 +247,7 @@ impl<'a, const N: usize> System<'a, N> {
                 Err(Failure::Refused { reason })
                     if self.limit.is_none() || self.wait_whether_start_up_aborts()? =>
                 {
-                    print_status(&reason);
+                    print_status(&format!("refused: {reason}"));
                 }
                 checked => {
                     checked?;
