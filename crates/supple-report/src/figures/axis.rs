@@ -37,8 +37,16 @@ impl<'a> Axis<'a> {
         }
     }
 
-    /// Creates a logarithmic axis over a range above zero, with ticks at 1, 2 and 5 of each decade.
+    /// Creates a logarithmic axis over a range above zero, with ticks at 1, 2 and 5 of each decade. Of a range from zero it shows the last
+    /// three decades; values at or below zero are at the start of the axis.
     pub fn logarithmic(label: &'a str, range: Range<f64>) -> Axis<'a> {
+        let end = if range.end > 0.0 { range.end } else { 1.0 };
+        let start = if range.start > 0.0 {
+            range.start
+        } else {
+            1e-3 * end
+        };
+        let range = start..end;
         let first = range.start.log10().floor() as i32;
         let last = range.end.log10().ceil() as i32;
         let ticks_at = (first..=last)
@@ -64,7 +72,7 @@ pub struct Scale {
 impl Scale {
     fn coordinate(&self, value: f64) -> f64 {
         if self.logarithmic {
-            value.log10()
+            value.max(self.range.start).log10()
         } else {
             value
         }
@@ -108,5 +116,30 @@ impl ValueFormatter<f64> for Scale {
             return number(*value, decimals as usize);
         }
         self.ticks.label(*value)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A force that is never above zero gave a range from zero: the decades of its ticks began at the smallest integer.
+    #[test]
+    fn a_logarithmic_axis_from_zero_has_few_ticks() {
+        for (range, expected) in [
+            (0.0..5.0, 5e-3),
+            (-1.0..5.0, 5e-3),
+            (0.0..0.0, 1e-3),
+            (0.1..5.0, 0.1),
+        ] {
+            let scale = Axis::logarithmic("force [N]", range).scale;
+            assert!(scale.ticks.at.len() < 20, "{:?}", scale.ticks);
+            assert!(
+                (scale.range.start - expected).abs() < 1e-12,
+                "{:?}",
+                scale.range
+            );
+            assert!(scale.coordinate(0.0).is_finite());
+        }
     }
 }
