@@ -446,3 +446,34 @@ fn openarm_and_yam_track_a_sinusoid_at_5_n_per_m() {
         assert!(oblique < 0.03, "{errors_m:?}");
     }
 }
+
+/// The arms with geared motors probe at every stiffness of figure 5: their damping ratio is possible with the delay of the loop at the greatest,
+/// too, where a request of more damping is refused.
+#[test]
+fn openarm_and_yam_begin_to_probe_at_the_greatest_stiffness() {
+    fn begins<const N: usize>(name: &str) {
+        let given = Description::asset(name).expect("a built-in arm");
+        // With the place of the block, as the programs derive it.
+        let description = given.completed().expect("a place in reach").description;
+        let setup = Setup::<N>::new(&description, 1).expect("its joints");
+        let greatest = scenario::PROBING_STIFFNESS_N_PER_M;
+        let greatest = greatest.iter().copied().fold(0.0, f64::max);
+        let mut config = setup.config(&perturbed(1)).expect("a physical model");
+        config.law.gains = scenario::gains_like(&config.law.gains, greatest);
+        let paths = setup.paths();
+        let (probe, _) = paths.probe(setup.tip_radius_m());
+        let plan = Plan {
+            name: name.to_owned(),
+            config,
+            plant: setup.plant(&perturbed(1), scenario::block_at(&paths)),
+            trajectory: Trajectory::Probe(probe),
+            duration_s: 0.5,
+            learning: false,
+            gain_change: None,
+        };
+        let run = run(&plan, &mut |_, _| Ok(())).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!(run.ended, None, "{name}");
+    }
+    begins::<7>("openarm");
+    begins::<6>("yam");
+}

@@ -51,7 +51,7 @@ pub fn presliding_rad<const N: usize>(
     let loads = motions
         .iter()
         .map(|motion| loaded.then(|| loads_nm(fit, motion)));
-    let loads_nm: Vec<Option<Vec<Vector<N>>>> = loads.collect();
+    let loads: Vec<Option<Vec<Vector<N>>>> = loads.collect();
     for (row, &joint) in fit.columns.identified_joints().iter().enumerate() {
         let dry = [
             Column::Coulomb(joint),
@@ -85,8 +85,8 @@ pub fn presliding_rad<const N: usize>(
                 presliding_rad: travel_rad,
                 ..of_joint
             };
-            let dry = motions.iter().zip(&loads_nm);
-            let dry = dry.map(|(motion, loads)| dry_nm(&law, motion, joint, loads.as_ref()));
+            let dry = motions.iter().zip(&loads);
+            let dry = dry.map(|(motion, loads)| dry_nm(&law, motion, joint, loads.as_deref()));
             let dry = dry.collect::<Result<Vec<_>, _>>()?;
             let mut sums = [0.0; 2];
             for (k, reversal) in reversals.iter().enumerate() {
@@ -122,9 +122,9 @@ pub fn presliding_rad<const N: usize>(
 /// friction. The columns of the fit have the load of the motion itself.
 fn loads_nm<const N: usize>(fit: &Fit<N>, motion: &Motion) -> Vec<Vector<N>> {
     let rest = Vector::<N>::zeros();
-    let offset = |column: Column| fit.value(column);
-    let offset_nm =
-        Vector::<N>::from_fn(|j, _| offset(Column::Offset(j)) + offset(Column::StribeckOffset(j)));
+    let offset_nm = Vector::<N>::from_fn(|j, _| {
+        fit.value(Column::Offset(j)) + fit.value(Column::StribeckOffset(j))
+    });
     let at = |i: usize| {
         let q = Vector::from_fn(|j, _| motion.q[(i, j)]);
         fit.predict(&q, &rest, &rest) - offset_nm
@@ -137,7 +137,7 @@ fn dry_nm<const N: usize>(
     law: &Friction,
     motion: &Motion,
     joint: usize,
-    loads_nm: Option<&Vec<Vector<N>>>,
+    loads_nm: Option<&[Vector<N>]>,
 ) -> Result<Vec<f64>, IdentError> {
     let step_s = 1.0 / motion.rate_hz;
     let mut direction = 0.0;

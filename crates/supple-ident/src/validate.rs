@@ -175,3 +175,32 @@ impl Validation {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_verdict_grades_the_unexplained_torque() {
+        let of = |total_relative: f64, positive_definite: f64| {
+            let validation = Validation {
+                rms_nm: vec![0.1],
+                peak_nm: vec![0.3],
+                relative: vec![total_relative],
+                of_deviation: vec![total_relative],
+                total_relative,
+                positive_definite,
+            };
+            verdict(&[("log".to_owned(), &validation)], &["joint1".to_owned()])
+        };
+        for (total_relative, positive_definite, grade) in [
+            (0.03, 1.0, "good: 3.00 %"),
+            (0.103, 1.0, "fair: 10.30 %"),
+            (0.3, 1.0, "poor: 30.0 %"),
+            (0.03, 0.99, "not usable"),
+        ] {
+            let found = of(total_relative, positive_definite);
+            assert!(found.starts_with(grade), "{found}");
+        }
+    }
+}

@@ -96,7 +96,7 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     let fault = (!summary.faults.is_empty()).then(|| Failure::RunFault {
         faults: summary.faults.join("; "),
     });
-    if summary.lost_in_time && args.stalls_matter() && summary.wake_us.max > STALL_US {
+    if summary.input_was_missing && args.stalls_matter() && summary.wake_us.max > STALL_US {
         print_status(&format!(
             "this machine woke a process {:.1} ms late: a fault of replies or states that are missing may be its own; an emulated or \
              simulated arm needs two free processors (`supple doctor`), or --virtual-time",

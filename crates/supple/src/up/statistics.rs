@@ -26,7 +26,7 @@ pub struct RunStatistics {
     tracked: u64,
     fault: u8,
     faults: Vec<String>,
-    lost_in_time: bool,
+    input_was_missing: bool,
 }
 
 /// Percentiles of a distribution.
@@ -78,7 +78,7 @@ pub struct UpSummary {
     pub faults: Vec<String>,
     /// Whether a fault latched because states or replies were missing, as they also are if the machine stalls.
     #[serde(skip)]
-    pub lost_in_time: bool,
+    pub input_was_missing: bool,
     /// Reason why the log or the trace is incomplete; none if both are complete.
     pub incomplete_output: Option<String>,
     /// Real-time factor: simulated time over wall-clock time; none in real time.
@@ -101,7 +101,7 @@ impl Default for RunStatistics {
             tracked: 0,
             fault: 0,
             faults: Vec::new(),
-            lost_in_time: false,
+            input_was_missing: false,
         }
     }
 }
@@ -135,7 +135,7 @@ impl RunStatistics {
                 fault_kind::ENCODER_LOST,
                 fault_kind::ENCODER_UNRELIABLE,
             ];
-            self.lost_in_time |= kinds.contains(&telemetry.record().fault);
+            self.input_was_missing |= kinds.contains(&telemetry.record().fault);
         }
         self.fault = telemetry.record().fault;
     }
@@ -174,7 +174,7 @@ impl RunStatistics {
             rms_error_m: mean(self.squared_error_m2, self.tracked).map(f64::sqrt),
             tracked_cycles: self.tracked,
             faults: self.faults.clone(),
-            lost_in_time: self.lost_in_time,
+            input_was_missing: self.input_was_missing,
             incomplete_output: None,
             times_real_time: None,
         }
