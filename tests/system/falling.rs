@@ -182,7 +182,11 @@ fn is_held_until_supported(up: &mut Up) {
     pause(DECLARED);
     let status = up.wait_until("a status", |_| true);
     assert_eq!(status["drives"], "active", "{status}");
-    kill_process(up.process(), Signal::TERM).expect("it runs");
+    let stopped = up.run(&["stop", "--json"]);
+    assert!(stopped.status.success(), "{}", stderr_of(&stopped));
+    assert_eq!(json(&stopped)["ended"], false, "it is held");
+    let words = stderr_of(&stopped);
+    assert!(words.contains("supple stop --supported"), "{words}");
     pause(HELD);
     let supported = up.run(&["stop", "--supported"]);
     assert!(supported.status.success(), "{}", stderr_of(&supported));

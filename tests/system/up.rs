@@ -179,6 +179,29 @@ fn a_second_run_keeps_the_log_of_the_first() {
     assert!(read("out/up.previous.mcap") == first);
 }
 
+/// Expected: starts that fail before the first cycle, however many, replace no log.
+#[test]
+fn starts_that_fail_keep_both_logs() {
+    let folder = temporary_folder();
+    let up = |plant: &str| {
+        let words = ["up", "--virtual-time", "--for", "0.2"].into_iter();
+        let words: Vec<&str> = words.chain(plant.split(' ')).collect();
+        run(folder.path(), &words)
+    };
+    for _ in 0..2 {
+        let output = up("--plant sim");
+        assert!(output.status.success(), "{}", stderr_of(&output));
+    }
+    let read = |name: &str| std::fs::read(folder.path().join(name)).expect("a log");
+    let names = ["out/up.mcap", "out/up.previous.mcap"];
+    let before = names.map(read);
+    for _ in 0..2 {
+        let failed = up("--plant emu --arm yam --misbehave silent:motor=2");
+        assert_eq!(failed.status.code(), Some(10), "{}", stderr_of(&failed));
+    }
+    assert!(names.map(read) == before);
+}
+
 #[test]
 fn without_a_system_every_command_is_code_10() {
     let folder = temporary_folder();

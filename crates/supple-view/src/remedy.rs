@@ -8,7 +8,7 @@ pub fn remedy(kind: u8) -> &'static str {
         fault::MEASUREMENT_NOT_FINITE => {
             "Check the sensor and its cable; the arm brakes until the sensor reports finite values again."
         }
-        fault::ENCODER_LOST => {
+        fault::ENCODER_LOST | fault::ENCODER_UNRELIABLE => {
             "Check the bus and the cable of this joint; on a busy machine replies also come too late (supple doctor). Then reset and \
              enter gravity hold."
         }
@@ -33,10 +33,7 @@ pub fn remedy(kind: u8) -> &'static str {
         fault::TORQUE_NOT_FINITE => {
             "This is a bug in supple, or an invalid description: keep the log and report it."
         }
-        fault::ENCODER_JUMP
-        | fault::ENCODER_STUCK
-        | fault::ENCODER_UNMOVED
-        | fault::ENCODER_UNRELIABLE => {
+        fault::ENCODER_JUMP | fault::ENCODER_STUCK | fault::ENCODER_UNMOVED => {
             "Check the encoder of this joint and its cable before the arm moves again, then reset."
         }
         fault::JOINT_TRACKING_ERROR => {

@@ -96,6 +96,7 @@ pub enum Command {
     /// Clear the latched fault of a running system.
     Reset(SystemArgs),
     /// Shut a running system down, and wait until it has ended: the controller sets the drives to idle, an arm without brakes is laid down.
+    /// One that `supple up --hold-until-supported` holds is not waited for: `supple stop --supported` releases it.
     Stop(StopArgs),
     /// Check whether this machine can run an arm in real time.
     #[command(after_help = CODES)]
@@ -210,8 +211,8 @@ pub struct StopArgs {
     /// Declare that the arm is supported: an arm that `supple up --hold-until-supported` holds is released.
     #[arg(long)]
     pub supported: bool,
-    /// Return at once, while the system still shuts down.
-    #[arg(long)]
+    /// Return at once, while the system still shuts down; not with --supported, which is declared until the system has ended.
+    #[arg(long, conflicts_with = "supported")]
     pub no_wait: bool,
     /// The system.
     #[command(flatten)]

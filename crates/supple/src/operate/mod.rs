@@ -293,12 +293,10 @@ pub fn stop(args: &StopArgs) -> Result<(), Failure> {
         pause(PIDFILE_INTERVAL);
     };
     running.terminate(args.supported)?;
-    if running.held_until_supported && !args.supported {
-        print_status(
-            "the arm is held: support it, then run `supple stop --supported`, which releases it",
-        );
-    } else if !args.no_wait {
-        wait_for_end(&running, args.supported)?;
+    match (args.no_wait, args.supported) {
+        (true, _) => {}
+        (false, false) if running.held_until_supported => wait_unless_held(&running),
+        (false, supported) => wait_for_end(&running, supported)?,
     }
     match system.json {
         true => print_json(&StopResult {
@@ -306,6 +304,20 @@ pub fn stop(args: &StopArgs) -> Result<(), Failure> {
             ended: !running.runs(),
         }),
         false => Ok(()),
+    }
+}
+
+/// Waits until a system has ended that holds its arm until it is supported, if drives have torque; not longer than one without takes.
+fn wait_unless_held(running: &RunningSystem) {
+    let start = Instant::now();
+    while running.runs() && start.elapsed() < SILENT_WAIT {
+        pause(PIDFILE_INTERVAL);
+    }
+    if running.runs() {
+        print_status(
+            "the system still runs and holds the arm, if its drives have torque: support the arm, then run `supple stop --supported`, \
+             which releases it",
+        );
     }
 }
 

@@ -380,8 +380,9 @@ impl RunningSystem {
     fn send(&self, signal: Signal) -> Result<(), Failure> {
         match kill_process(self.process, signal) {
             Err(Errno::SRCH) => Ok(()),
-            sent => sent
-                .map_err(|error| Failure::file("end the process of", &self.pidfile, error.into())),
+            sent => sent.map_err(|error| {
+                Failure::file("signal the process of", &self.pidfile, error.into())
+            }),
         }
     }
 

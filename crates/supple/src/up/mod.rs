@@ -35,9 +35,6 @@ use supple_ipc::Domain;
 use supple_model::{Description, with_dof};
 use viewer::Viewer;
 
-/// Delay of a process above which a stall of the machine may have caused a fault \[us\].
-const STALL_US: f64 = 2000.0;
-
 /// Runs `supple up`.
 ///
 /// # Errors
@@ -76,9 +73,6 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     let stop = interrupt::shutdown_on_interrupt();
     let mut pidfile = Pidfile::create(&domain, &args.arm, args.hold_until_supported)?;
     let mut system = System::<N>::new(args, description, &domain)?;
-    if args.log.is_none() && !args.no_log {
-        outputs::keep_previous_log();
-    }
     let started = system.start(description);
     let viewer = match (&started, args.view) {
         (Ok(()), true) => Viewer::start(args, &domain).map(Some),
@@ -90,17 +84,20 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
     let result = started.and_then(|()| system.run_until_end(&stop, &mut pidfile));
     drop(viewer);
     let shut_down = system.end();
-    let mut summary = system.finish();
+    let mut summary = system.finish(args.log.is_none() && !args.no_log);
     let incomplete = system.incomplete_output();
     summary.incomplete_output = incomplete.as_ref().map(ToString::to_string);
     let fault = (!summary.faults.is_empty()).then(|| Failure::RunFault {
         faults: summary.faults.join("; "),
     });
-    if summary.input_was_missing && args.stalls_matter() && summary.wake_us.max > STALL_US {
+    if args.stalls_matter() && summary.may_have_stalled() {
         print_status(&format!(
-            "this machine woke a process {:.1} ms late: a fault of replies or states that are missing may be its own; an emulated or \
-             simulated arm needs two free processors (`supple doctor`), or --virtual-time",
-            1e-3 * summary.wake_us.max
+            "this machine stopped the plant for {:.1} ms in all and woke it up to {:.1} ms late, {} commands were missed: a fault of replies or \
+             states that are missing may be its own; an emulated or simulated arm needs two free processors (`supple doctor`), or \
+             --virtual-time",
+            summary.clock_stall_ms,
+            1e-3 * summary.wake_us.max,
+            summary.missed
         ));
     }
     match (result.and(shut_down), &fault) {
@@ -118,7 +115,7 @@ fn sized<const N: usize>(args: &UpArgs, description: &Description) -> Result<(),
         print_json(&summary)?;
     } else {
         print_line(summary.to_string().trim_end())?;
-        if let (Some(log), None) = (args.log_file(), &incomplete) {
+        if let (Some(log), None, true) = (args.log_file(), &incomplete, summary.cycles > 0) {
             print_status(&format!("log: {}", log.display()));
         }
     }

@@ -41,6 +41,11 @@ impl<const N: usize> RunLog<N> {
         self.end_with(finished);
     }
 
+    /// Ends the log without its final name.
+    pub fn leave_part(&mut self) {
+        self.recorder = None;
+    }
+
     /// Returns the reason why the log ended before the run.
     pub fn ended(&mut self) -> Option<Failure> {
         self.ended.take()

@@ -9,6 +9,9 @@ use supple_ipc::message::{PlantReport, Telemetry};
 
 /// Upper end of the histogram range \[ns\].
 const MAX_LATENCY_NS: u64 = 10_000_000_000;
+/// Time for which the plant's clock was paused in all, and delay of a wake-up, above which the machine may have caused a fault. A stall pauses
+/// the clock, and only what is left of it delays the wake-up.
+const STALL_MS: f64 = 2.0;
 /// Significant decimal digits of the histograms.
 const DIGITS: u8 = 3;
 
@@ -83,6 +86,13 @@ pub struct UpSummary {
     pub incomplete_output: Option<String>,
     /// Real-time factor: simulated time over wall-clock time; none in real time.
     pub times_real_time: Option<f64>,
+}
+
+impl UpSummary {
+    /// Whether inputs were missing and this machine may be the reason, because it stalled.
+    pub fn may_have_stalled(&self) -> bool {
+        self.input_was_missing && self.clock_stall_ms.max(1e-3 * self.wake_us.max) > STALL_MS
+    }
 }
 
 impl Default for RunStatistics {
@@ -227,5 +237,31 @@ impl fmt::Display for UpSummary {
             )?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::RunStatistics;
+
+    /// A stall pauses the plant's clock, so that a wake-up is hardly late; either may be the reason of missing inputs.
+    #[test]
+    fn a_stall_is_the_pause_of_the_clock_or_the_delay_of_a_wake_up() {
+        for (input_was_missing, clock_stall_ms, late_us, expected) in [
+            (true, 50.0, 100.0, true),
+            (true, 0.0, 3000.0, true),
+            (true, 0.2, 300.0, false),
+            (false, 50.0, 3000.0, false),
+        ] {
+            let mut summary = RunStatistics::default().summary(0);
+            summary.input_was_missing = input_was_missing;
+            summary.clock_stall_ms = clock_stall_ms;
+            summary.wake_us.max = late_us;
+            assert_eq!(
+                summary.may_have_stalled(),
+                expected,
+                "{clock_stall_ms} ms, {late_us} us"
+            );
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! A running system: its processes, telemetry and log.
 
 use super::children::{ChildProcesses, Pidfile};
+use super::outputs;
 use super::plan::{Plan, SHUTDOWN_TIMEOUT};
 use super::recorder::{Recorder, RunLog};
 use super::start_up::{GRAVITY_HOLD_S, START_S, StartUp, cycles_of};
@@ -363,9 +364,17 @@ impl<'a, const N: usize> System<'a, N> {
         controller.and(clock_owner).and(drained).and(arm)
     }
 
-    /// Closes the log and returns the summary of the run.
-    pub fn finish(&mut self) -> UpSummary {
-        self.run_log.finish();
+    /// Closes the log and returns the summary of the run. A run without a cycle leaves the part of its log and every older log; another one
+    /// first keeps the default log of the run before, if it should.
+    pub fn finish(&mut self, keeps_previous: bool) -> UpSummary {
+        if self.statistics.cycles() == 0 {
+            self.run_log.leave_part();
+        } else {
+            if keeps_previous {
+                outputs::keep_previous_log();
+            }
+            self.run_log.finish();
+        }
         let mut summary = self.statistics.summary(self.reader.lost());
         summary.times_real_time = self.times_real_time();
         summary
