@@ -38,7 +38,7 @@ impl<'a> Axis<'a> {
     }
 
     /// Creates a logarithmic axis over a range above zero, with ticks at 1, 2 and 5 of each decade. Of a range from zero it shows the last
-    /// three decades; values at or below zero are at the start of the axis.
+    /// three decades; smaller values are drawn at the start of the axis.
     pub fn logarithmic(label: &'a str, range: Range<f64>) -> Axis<'a> {
         let end = if range.end > 0.0 { range.end } else { 1.0 };
         let start = if range.start > 0.0 {

@@ -47,7 +47,7 @@ pub fn draw(runs: &SinusoidRuns<'_>) -> Result<String, FigureError> {
         let y_ticks = Ticks::around(extent(runs.at_paper_speed.iter().flat_map(x)), 5);
         let mut panel = Panel::new(
             &position,
-            "(i)  reference and actual tip, K = 5 N/m, B = 1.5 N s/m",
+            "(i)  reference and actual tip, K = 5 N/m",
             Margins::default(),
             &Axis::new("time [s]", time.clone()),
             &Axis::new("x [m]", y_ticks),

@@ -10,7 +10,7 @@ use plotters::style::RGBColor;
 
 /// Width of the canvas and height of a panel \[px\].
 const SIZE_PX: (u32, u32) = (760, 190);
-/// Maximum number of points of a curve. In a longer curve, each pair of points is the minimum and maximum of an interval.
+/// Maximum number of points of a curve, apart from two more for each gap. In a longer curve, each pair of points is the minimum and maximum of an interval.
 const MAX_POINTS: usize = 4000;
 
 /// A curve ends before an interval that is longer than this multiple of its median interval, and begins again after it.

@@ -134,8 +134,8 @@ pub(super) fn quadrant(summary: &Summary) -> Section {
                constant speed on each piece; two rounds. First with the plant's own parameters, then \
                with a perturbed model, then at the paper's maximum speed. A corner there changes the velocity by \
                0.3 to 0.4 m/s at once; no torque follows that, so the arm keeps the difference, which the \
-               damping takes away with the time constant m / B: about a second for 1.4 kg and 1.5 N s/m, as long as \
-               a piece lasts. With ten times the damping it dies out. With a reference that stops at each corner, by an acceleration \
+               damping takes away with the time constant m / B: about a second for the WAM's 1.4 kg and 1.5 N s/m, as \
+               long as a piece lasts. With 15 N s/m it dies out. With a reference that stops at each corner, by an acceleration \
                that the law feeds forward, it does not arise.",
         rows,
     }
