@@ -405,7 +405,7 @@ fn the_sinusoid_runs_with_seven_active_joints() {
 
 /// Tracks sinusoids with the arms with geared motors, at 5 N/m with a model that has the error of an identification. In the
 /// sagittal plane of the OpenArm, joint 2 stands still, as the base of the paper's arm does. Outside this plane, it moves slightly
-/// and reverses, with a short lever arm: its dry friction then causes a tip error of some 20 mm.
+/// and reverses, with a short lever arm: its dry friction then causes a greater error. Measured: 3.5 and 4.1, 3.0 and 4.4, 5.0 and 7.6 mm.
 #[test]
 fn openarm_and_yam_track_a_sinusoid_at_5_n_per_m() {
     fn rms_error_m<const N: usize>(name: &str, centre_m: [f64; 3], seed: u64) -> f64 {
@@ -442,8 +442,8 @@ fn openarm_and_yam_track_a_sinusoid_at_5_n_per_m() {
     });
     for errors_m in found {
         let [openarm, yam, oblique] = errors_m;
-        assert!(openarm < 0.015 && yam < 0.015, "{errors_m:?}");
-        assert!(oblique < 0.03, "{errors_m:?}");
+        assert!(openarm < 0.007 && yam < 0.007, "{errors_m:?}");
+        assert!(oblique < 0.012, "{errors_m:?}");
     }
 }
 

@@ -110,8 +110,9 @@ impl<const N: usize> Fit<N> {
     }
 }
 
-/// Torque error relative to the torque above which a model is poor, and up to which it is good.
+/// Torque error relative to the torque above which a model is poor.
 const POOR: f64 = 0.2;
+/// Torque error relative to the torque up to which a model is good.
 const GOOD: f64 = 0.05;
 /// Ratio of a joint's error to the deviation of its torque above which its model counts as poor.
 const POOR_JOINT: f64 = 0.5;

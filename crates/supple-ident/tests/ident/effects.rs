@@ -360,8 +360,8 @@ fn learning_friction_keeps_the_springs() {
 }
 
 /// A motion in which every joint reverses, of an arm whose dry friction reverses over `travel_rad`; zero: with the velocity. Gears add
-/// `load_coefficient` of the torque that a joint carries.
-fn reversing_motion(config: &Config<4>, travel_rad: f64, load_coefficient: f64) -> Motion {
+/// the share `load.0` of the torque `load.1`.
+fn reversing_motion(config: &Config<4>, travel_rad: f64, load: (f64, LoadTorque)) -> Motion {
     let (rate_hz, samples) = (200.0, 12_000);
     let angle = |i: usize, j: usize| {
         let t = i as f64 / rate_hz;
@@ -394,7 +394,8 @@ fn reversing_motion(config: &Config<4>, travel_rad: f64, load_coefficient: f64) 
         for j in ALL {
             let law = Friction {
                 presliding_rad: travel_rad,
-                load_coefficient,
+                load_coefficient: load.0,
+                load_torque: load.1,
                 ..config.friction[j]
             };
             direction[j] = match travel_rad > 0.0 {
@@ -415,7 +416,11 @@ fn reversing_motion(config: &Config<4>, travel_rad: f64, load_coefficient: f64) 
 fn the_presliding_distance_is_found_if_the_arm_has_one() {
     let config = wam4();
     for travel_rad in [0.0, 1e-3] {
-        let motions = [reversing_motion(&config, travel_rad, 0.0)];
+        let motions = [reversing_motion(
+            &config,
+            travel_rad,
+            (0.0, LoadTorque::Joint),
+        )];
         let options = Options {
             consistent_prior_weight: Some(1e-4),
             ..Options::default()
@@ -431,18 +436,23 @@ fn the_presliding_distance_is_found_if_the_arm_has_one() {
 #[test]
 fn the_presliding_distance_is_that_of_all_dry_friction() {
     let config = wam4();
-    for travel_rad in [7e-4, 2e-3] {
-        let motions = [reversing_motion(&config, travel_rad, 0.2)];
+    for (travel_rad, load_torque) in [
+        (7e-4, LoadTorque::Joint),
+        (2e-3, LoadTorque::Joint),
+        (7e-4, LoadTorque::Motor),
+        (2e-3, LoadTorque::Motor),
+    ] {
+        let motions = [reversing_motion(&config, travel_rad, (0.2, load_torque))];
         let options = Options {
             consistent_prior_weight: Some(1e-4),
             friction: FrictionColumns {
-                load: Some(LoadTorque::Joint),
+                load: Some(load_torque),
                 ..FrictionColumns::COULOMB
             },
             ..Options::default()
         };
         let found = fit(&config.arm, &motions, &ALL, &options).unwrap();
         let travels = presliding_rad(&found, &motions).unwrap();
-        assert_eq!(travels, vec![travel_rad; 4]);
+        assert_eq!(travels, vec![travel_rad; 4], "{load_torque:?}");
     }
 }
