@@ -451,7 +451,7 @@ fn openarm_and_yam_track_a_sinusoid_at_5_n_per_m() {
 /// too, where a request of more damping is refused.
 #[test]
 fn openarm_and_yam_begin_to_probe_at_the_greatest_stiffness() {
-    fn begins<const N: usize>(name: &str) {
+    fn runs<const N: usize>(name: &str, damping_factor: f64) -> bool {
         let given = Description::asset(name).expect("a built-in arm");
         // With the place of the block, as the programs derive it.
         let description = given.completed().expect("a place in reach").description;
@@ -460,6 +460,7 @@ fn openarm_and_yam_begin_to_probe_at_the_greatest_stiffness() {
         let greatest = greatest.iter().copied().fold(0.0, f64::max);
         let mut config = setup.config(&perturbed(1)).expect("a physical model");
         config.law.gains = scenario::gains_like(&config.law.gains, greatest);
+        config.law.gains.damping_n_s_per_m *= damping_factor;
         let paths = setup.paths();
         let (probe, _) = paths.probe(setup.tip_radius_m());
         let plan = Plan {
@@ -471,9 +472,8 @@ fn openarm_and_yam_begin_to_probe_at_the_greatest_stiffness() {
             learning: false,
             gain_change: None,
         };
-        let run = run(&plan, &mut |_, _| Ok(())).unwrap_or_else(|error| panic!("{name}: {error}"));
-        assert_eq!(run.ended, None, "{name}");
+        run(&plan, &mut |_, _| Ok(())).is_ok_and(|run| run.ended.is_none())
     }
-    begins::<7>("openarm");
-    begins::<6>("yam");
+    assert!(runs::<7>("openarm", 1.0) && runs::<6>("yam", 1.0));
+    assert!(!runs::<6>("yam", 1.1), "the limit is 16.4 N s/m");
 }
