@@ -69,6 +69,28 @@ fn the_emulated_arm_starts_up_is_activated_and_tracks() {
     assert!(at("Pressed(Activate)") < at("motor 1 Torque"));
 }
 
+/// A run that ends before the trajectory ends well and says which part it left out.
+#[test]
+fn a_run_shorter_than_its_start_ends_well_and_says_so() {
+    for (plant, seconds, name) in [
+        ("sim", "0.05", "approach"),
+        ("sim", "1", "trajectory"),
+        ("emu", "1", "trajectory"),
+    ] {
+        let folder = temporary_folder();
+        let how = format!("up --plant {plant} --virtual-time --for {seconds} --no-log");
+        let arguments: Vec<&str> = how.split(' ').collect();
+        let output = run(folder.path(), &arguments);
+        let said = stderr_of(&output);
+        assert_eq!(output.status.code(), Some(0), "{said}");
+        let expected = format!(
+            "the run ends after {:.1} s, before the {name}",
+            seconds.parse::<f64>().expect("a number")
+        );
+        assert!(said.contains(&expected), "{said}");
+    }
+}
+
 /// Seven joints run at 1 kHz on shared memory, and on the bus at its maximum rate; a higher rate is an error.
 #[test]
 fn seven_joints_run_as_processes() {

@@ -15,6 +15,7 @@ use std::path::Path;
 use std::time::Instant;
 use supple_cli::console::print_status;
 use supple_cli::exit::Failure;
+use supple_core::Vector;
 use supple_core::controller::{LearningSwitch, Request};
 use supple_ipc::message::Telemetry;
 use supple_ipc::{Domain, TelemetryReader};
@@ -114,9 +115,32 @@ impl<'a, const N: usize> System<'a, N> {
                 let learn = Request::Learning(LearningSwitch::On);
                 self.session.queue(&learn, LEARN_CYCLE)?;
             }
-            self.session.follow(&self.approach, &home, Some(start))?;
+            self.queue_approach(&home, start)?;
         }
         self.children.start(&self.plan.clock_owner)
+    }
+
+    /// Queues the approach from this pose \[rad\] and the trajectory, each if the run lasts until its cycle: the controller refuses
+    /// what is still queued when a run ends.
+    fn queue_approach(&mut self, from_rad: &Vector<N>, start: u64) -> Result<(), Failure> {
+        let (move_to_start, between, track) = self.approach.requests(from_rad);
+        let requests = [
+            (move_to_start, start, "approach"),
+            (track, start + between, "trajectory"),
+        ];
+        for (request, cycle, name) in requests {
+            match self.limit.filter(|limit| cycle >= *limit) {
+                None => self.session.queue(&request, cycle)?,
+                Some(limit) => {
+                    let [limit_s, begin_s] = [limit, cycle].map(|n| n as f64 * self.period_s);
+                    print_status(&format!(
+                        "the run ends after {limit_s:.1} s, before the {name}, which would begin after {begin_s:.1} s: increase --for"
+                    ));
+                    break;
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Starts the processes in virtual time as [`System::start`] does, with the caller's requests (cycles relative to the first
