@@ -12,7 +12,11 @@ use supple_model::Description;
 /// A limit on the file size of `supple up` simulates a full disk for this process only.
 #[test]
 fn a_full_disk_ends_the_log_but_not_the_run() {
-    let mut up = Up::start(&["--json", "--plant", "sim", "--log", "run.mcap"]);
+    let start = || Up::start(&["--json", "--plant", "sim", "--log", "run.mcap"]);
+    Up::again_after_a_stall(start, fill_the_disk);
+}
+
+fn fill_the_disk(up: &mut Up) {
     up.wait_until("control", |status| status["cycle"].as_u64() > Some(1000));
     let part = up.folder.path().join("run.mcap.part");
     let length = fs::metadata(&part).expect("the log").len();
