@@ -239,10 +239,17 @@ def test_an_interrupt_ends_a_long_calculation(before, call, after_s):
     assert heard_s <= HEARD_WITHIN_S
 
 
+def thread_name(task):
+    """Name of a thread; it may end while it is asked."""
+    try:
+        return (task / "comm").read_text().strip()
+    except (FileNotFoundError, ProcessLookupError):
+        return "ended"
+
+
 def worker_threads():
     """Threads in which a calculation runs."""
-    tasks = Path("/proc/self/task")
-    return [task for task in tasks.iterdir() if (task / "comm").read_text().strip() == "supple"]
+    return [task for task in Path("/proc/self/task").iterdir() if thread_name(task) == "supple"]
 
 
 def test_an_interrupted_identification_stops_computing():
