@@ -76,6 +76,7 @@ fn a_run_shorter_than_its_start_ends_well_and_says_so() {
         ("sim", "0.05", "approach"),
         ("sim", "1", "trajectory"),
         ("emu", "1", "trajectory"),
+        ("emu --arm yam", "1", "trajectory"),
     ] {
         let folder = temporary_folder();
         let how = format!("up --plant {plant} --virtual-time --for {seconds} --no-log");
@@ -84,7 +85,7 @@ fn a_run_shorter_than_its_start_ends_well_and_says_so() {
         let said = stderr_of(&output);
         assert_eq!(output.status.code(), Some(0), "{said}");
         let expected = format!(
-            "the run ends after {:.1} s, before the {name}",
+            "the run ends after {:.2} s, before the {name}",
             seconds.parse::<f64>().expect("a number")
         );
         assert!(said.contains(&expected), "{said}");

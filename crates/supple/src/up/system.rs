@@ -134,7 +134,7 @@ impl<'a, const N: usize> System<'a, N> {
                 Some(limit) => {
                     let [limit_s, begin_s] = [limit, cycle].map(|n| n as f64 * self.period_s);
                     print_status(&format!(
-                        "the run ends after {limit_s:.1} s, before the {name}, which would begin after {begin_s:.1} s: increase --for"
+                        "the run ends after {limit_s:.2} s, before the {name}, which would begin after {begin_s:.2} s: increase --for"
                     ));
                     break;
                 }
