@@ -15,7 +15,7 @@ const CREEP_AVERAGING_S: f64 = 0.5;
 /// of the averaging time.
 const SLOW_S: f64 = 1.0;
 /// Direction of dry friction, at most one, from which it counts as reversed. Less is in the middle of a reversal.
-const REVERSED: f64 = 0.95;
+const REVERSED: f64 = 0.9;
 
 /// Watches a joint's motion.
 #[derive(Clone, Copy, Debug)]
@@ -34,6 +34,11 @@ pub(crate) struct SlidingGate {
     since_fast_s: f64,
     /// Time for which the joint has crept in one direction \[s\].
     creeps_s: f64,
+    /// Direction of the average velocity, and the measured angle that is furthest in it \[rad\].
+    sign: f64,
+    furthest_rad: f64,
+    /// Whether it got further in this cycle.
+    gets_further: bool,
 }
 
 impl SlidingGate {
@@ -54,11 +59,20 @@ impl SlidingGate {
             mean_rad_per_s: 0.0,
             since_fast_s: 0.0,
             creeps_s: 0.0,
+            sign: 0.0,
+            furthest_rad: 0.0,
+            gets_further: false,
         }
     }
 
-    /// Processes a cycle with this velocity and this direction of the dry friction, -1 to 1.
-    pub(crate) fn update(&mut self, velocity_rad_per_s: f64, direction: f64, period_s: f64) {
+    /// Processes a cycle with this measured angle, this velocity, and this direction of the dry friction, -1 to 1.
+    pub(crate) fn update(
+        &mut self,
+        measured_rad: f64,
+        velocity_rad_per_s: f64,
+        direction: f64,
+        period_s: f64,
+    ) {
         let is_fast = velocity_rad_per_s.abs() >= self.min_rad_per_s;
         let reverses = velocity_rad_per_s * self.last_rad_per_s < 0.0;
         self.last_rad_per_s = velocity_rad_per_s;
@@ -81,11 +95,26 @@ impl SlidingGate {
         } else {
             0.0
         };
+        let sign = self.mean_rad_per_s.signum();
+        self.gets_further = sign == self.sign && (measured_rad - self.furthest_rad) * sign > 0.0;
+        if self.gets_further || sign != self.sign {
+            (self.sign, self.furthest_rad) = (sign, measured_rad);
+        }
     }
 
     /// Returns whether the joint slides in one direction.
     pub(crate) fn is_open(&self) -> bool {
-        self.since_slow_s >= self.settle_s || self.creeps_s >= CREEPS_S
+        self.slides() || self.creeps_s >= CREEPS_S
+    }
+
+    fn slides(&self) -> bool {
+        self.since_slow_s >= self.settle_s
+    }
+
+    /// Returns whether the joint has moved until this cycle. One that creeps has when its measured angle gets further: it may rest for
+    /// half a second until its average velocity shows it, under less than its friction.
+    pub(crate) fn has_moved(&self) -> bool {
+        self.slides() || (self.is_open() && self.gets_further)
     }
 
     /// Returns whether the joint has crept in one direction for longer than one that starts or stops.
@@ -111,7 +140,7 @@ mod tests {
     fn after(mut gate: SlidingGate, duration_s: f64, motion: impl Fn(f64) -> (f64, f64)) -> bool {
         for cycle in 0..(duration_s / PERIOD_S) as usize {
             let (velocity, direction) = motion(cycle as f64 * PERIOD_S);
-            gate.update(velocity, direction, PERIOD_S);
+            gate.update(0.0, velocity, direction, PERIOD_S);
         }
         gate.is_open()
     }
@@ -137,8 +166,33 @@ mod tests {
 
     #[test]
     fn a_joint_in_the_middle_of_its_reversal_keeps_it_closed() {
-        assert!(!after(gate(1e-3), 3.0, |_| (5e-3, 0.9)));
+        assert!(!after(gate(1e-3), 3.0, |_| (5e-3, 0.85)));
         assert!(!after(gate(1e-3), 3.0, |_| (5e-3, -1.0)));
         assert!(after(gate(1e-3), 3.0, |_| (5e-3, 0.99)));
+    }
+
+    /// A joint that creeps at five milliradians a second in steps of an encoder, then rests. Its friction is known until the last step;
+    /// the gate is open for longer.
+    #[test]
+    fn a_creeping_joint_has_not_moved_after_its_last_step() {
+        let (step_rad, step_s, rests_s) = (0.38e-3, 0.076, 3.0);
+        let mut gate = gate(1e-3);
+        let (mut last_open_s, mut last_moved_s, mut moved) = (0.0, 0.0, 0);
+        for cycle in 0..5000 {
+            let t_s = f64::from(cycle) * PERIOD_S;
+            let since_step_s = if t_s < rests_s { t_s % step_s } else { 1.0 };
+            let measured_rad = (t_s.min(rests_s) / step_s).floor() * step_rad;
+            let velocity = step_rad * 40.0 * (-since_step_s * 40.0).exp();
+            gate.update(measured_rad, velocity, 0.99, PERIOD_S);
+            if gate.is_open() {
+                last_open_s = t_s;
+            }
+            if gate.has_moved() {
+                (last_moved_s, moved) = (t_s, moved + 1);
+            }
+        }
+        assert!(moved > 20, "{moved}");
+        assert!(last_moved_s < rests_s, "{last_moved_s}");
+        assert!(last_open_s > rests_s + 0.3, "{last_open_s}");
     }
 }

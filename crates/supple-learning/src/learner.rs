@@ -83,6 +83,8 @@ pub struct Learner<const N: usize> {
     summed: u32,
     cycles_per_sample: u32,
     interval_s: f64,
+    /// Samples since a joint was last known to have moved: they are discarded if it rests.
+    unconfirmed: Vec<Information>,
     collecting: Vec<Information>,
     waiting: VecDeque<Vec<Information>>,
     samples: Vec<Information>,
@@ -115,6 +117,7 @@ impl<const N: usize> Learner<N> {
             summed: 0,
             cycles_per_sample: ((SAMPLE_S / config.period_s) as u32).max(1),
             interval_s: 0.0,
+            unconfirmed: vec![Information::empty(); N],
             collecting: vec![Information::empty(); N],
             waiting: VecDeque::new(),
             samples: vec![Information::empty(); N],
@@ -185,8 +188,13 @@ impl<const N: usize> Learner<N> {
         let rows = self.rows.add_cycle(record);
         self.since_freeze_s += self.period_s;
         for (i, gate) in self.gates.iter_mut().enumerate() {
-            let direction = self.rows.direction()[i];
-            gate.update(rows[i].columns[VISCOUS], direction, self.period_s);
+            let (angle_rad, direction) = (record.position_rad[i], self.rows.direction()[i]);
+            gate.update(
+                angle_rad,
+                rows[i].columns[VISCOUS],
+                direction,
+                self.period_s,
+            );
         }
         match FreezeReason::of_cycle(record) {
             Some(frozen) => {
@@ -217,21 +225,31 @@ impl<const N: usize> Learner<N> {
         for (i, (sum, row)) in self.sums.iter_mut().zip(rows).enumerate() {
             if !self.gates[i].is_open() {
                 *sum = None;
+                self.unconfirmed[i] = Information::empty();
             } else if let Some(sum) = sum {
                 sum.add(row);
             }
         }
         self.summed += 1;
-        if self.summed < self.cycles_per_sample {
-            return;
+        if self.summed >= self.cycles_per_sample {
+            self.end_sample();
         }
+        for (i, gate) in self.gates.iter().enumerate() {
+            if gate.has_moved() && !self.unconfirmed[i].is_empty() {
+                let confirmed = core::mem::replace(&mut self.unconfirmed[i], Information::empty());
+                self.collecting[i].merge(&confirmed);
+            }
+        }
+    }
+
+    fn end_sample(&mut self) {
         let cycles = f64::from(self.summed);
         for (i, sum) in self.sums.iter_mut().enumerate() {
             if let Some(sum) = sum {
                 let weight =
                     cycles * self.period_s / CORRELATION_S / self.prior.noise_nm[i].powi(2);
                 let creeps = self.gates[i].creeps_on();
-                self.collecting[i].add(&sum.scaled(1.0 / cycles), weight, creeps);
+                self.unconfirmed[i].add(&sum.scaled(1.0 / cycles), weight, creeps);
             }
         }
         self.begin_sample();
@@ -245,6 +263,7 @@ impl<const N: usize> Learner<N> {
     /// Discards all samples that have not been used.
     fn discard(&mut self) {
         self.waiting.clear();
+        self.unconfirmed = vec![Information::empty(); N];
         self.collecting = vec![Information::empty(); N];
         self.begin_sample();
         self.interval_s = 0.0;
