@@ -1,8 +1,8 @@
 //! Presliding: the travel over which dry friction reverses after a reversal of motion.
 //!
 //! Within this travel a joint does not slide: its bearings and cables act as a spring, and the friction follows `p' = v (1 - p
-//! sign(v)) / d` (Dahl 1968) rather than the sign of the velocity. For each joint, `d` is selected from a list such that the
-//! model best explains the torque around every second reversal of the logs. It is accepted if it also explains the remaining
+//! sign(v)) / d` (Dahl 1968) rather than the sign of the velocity. For each joint, `d` is selected from a list, and between its values, such
+//! that the model best explains the torque around every second reversal of the logs. It is accepted if it also explains the remaining
 //! reversals, which were not used for the selection, much better than a model without presliding. All of the dry friction reverses over
 //! `d`, that of the load too: with a part that reverses at once, the other would seem to take longer.
 
@@ -104,18 +104,40 @@ pub fn presliding_rad<const N: usize>(
             Ok(sums)
         };
         let without = errors(0.0)?;
-        let mut best = (0.0, without);
-        for travel_rad in TRAVELS_RAD {
-            let sums = errors(travel_rad)?;
-            if sums[0] < best.1[0] {
-                best = (travel_rad, sums);
-            }
-        }
-        if best.1[1] <= IMPROVEMENT * IMPROVEMENT * without[1] {
-            found[joint] = best.0;
+        let tried = TRAVELS_RAD.map(|travel_rad| errors(travel_rad).map(|sums| sums[0]));
+        let tried = tried.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let best = (0..tried.len()).min_by(|a, b| tried[*a].total_cmp(&tried[*b]));
+        let Some(best) = best.filter(|best| tried[*best] < without[0]) else {
+            continue;
+        };
+        let travel_rad = between_candidates(&tried, best);
+        if errors(travel_rad)?[1] <= IMPROVEMENT * IMPROVEMENT * without[1] {
+            found[joint] = travel_rad;
         }
     }
     Ok(found)
+}
+
+/// Returns the travel at which the parabola through the errors of the best candidate and its neighbours, over the logarithm of the travel,
+/// is least \[rad\]; the best candidate if it is the first or the last.
+fn between_candidates(errors: &[f64], best: usize) -> f64 {
+    if best == 0 || best + 1 == errors.len() {
+        return TRAVELS_RAD[best];
+    }
+    let log = |candidate: usize| TRAVELS_RAD[candidate].ln();
+    let (left, right) = (log(best - 1) - log(best), log(best + 1) - log(best));
+    let (left_rise, right_rise) = (
+        errors[best - 1] - errors[best],
+        errors[best + 1] - errors[best],
+    );
+    // Error above that of the best candidate: slope * x + curve * x^2, with the logarithm's change x.
+    let curve = (right_rise / right - left_rise / left) / (right - left);
+    let slope = right_rise / right - curve * right;
+    if curve > 0.0 {
+        (log(best) - 0.5 * slope / curve).exp()
+    } else {
+        TRAVELS_RAD[best]
+    }
 }
 
 /// Returns the torque that the joints carry at rest along a motion, without their friction: the load by which the controller computes their
@@ -143,17 +165,12 @@ fn dry_nm<const N: usize>(
     let mut direction = 0.0;
     let speeds = motion.qd.column(joint);
     let along = speeds.iter().enumerate().map(|(i, v)| {
-        direction = match law.presliding_rad > 0.0 {
-            true => law.direction_after(direction, v * step_s),
-            false => law.direction(*v),
+        let loaded = loads_nm.map_or(*law, |loads_nm| law.at_load(loads_nm[i][joint]));
+        direction = match loaded.presliding_rad > 0.0 {
+            true => loaded.direction_after(direction, v * step_s),
+            false => loaded.direction(*v),
         };
-        match loads_nm {
-            None => law.dry_size_nm(*v) * direction,
-            Some(loads_nm) => {
-                let loaded = law.at_load(loads_nm[i][joint]);
-                loaded.dry_size_nm(*v) * direction + loaded.offset_nm - law.offset_nm
-            }
-        }
+        loaded.dry_size_nm(*v) * direction + (loaded.offset_nm - law.offset_nm)
     });
     let along: Vec<f64> = along.collect();
     match motion.cutoff_hz {

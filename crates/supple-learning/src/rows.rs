@@ -154,7 +154,7 @@ impl<const N: usize> Rows<N> {
         let loaded: [Friction; N] =
             core::array::from_fn(|i| config.friction[i].at_load(self.terms.gravity[i]));
         for i in 0..N {
-            let friction = &config.friction[i];
+            let friction = &loaded[i];
             if friction.presliding_rad == 0.0 || first {
                 self.direction[i] = friction.direction(velocity[i]);
                 self.by_presliding[i] = 0.0;

@@ -230,8 +230,8 @@ pub struct FrictionSettings {
     /// Half-width of the band in which friction is a parabola (rad/s), positive. Default 0.01.
     #[serde(default = "default::band_rad_per_s")]
     pub band_rad_per_s: f64,
-    /// Travel over which dry friction turns round after a reversal (rad), zero or more. Default 0: its direction is that of
-    /// the velocity.
+    /// Travel over which dry friction turns round after a reversal (rad), zero or more; in proportion to the dry friction, where that
+    /// depends on the load. Default 0: its direction is that of the velocity.
     #[serde(default)]
     pub presliding_rad: f64,
     /// Dry friction that a torque on the gear adds, per torque, 0 to 0.5. Default 0: friction does not depend on the load.

@@ -49,7 +49,7 @@ impl<const N: usize> State<N> {
         let config = controller.config();
         let play_rad = self.stuck_encoders.resolution_rad(controller.encoders());
         self.measured_direction
-            .update(&config.friction, &self.position, &play_rad);
+            .update(&self.friction, &self.position, &play_rad);
         let tracks = matches!(self.activity, Activity::Track(_) | Activity::SetPoints(_))
             && config.law.friction_velocity == FrictionVelocity::Reference
             && !pose;
@@ -62,7 +62,7 @@ impl<const N: usize> State<N> {
         let velocity = velocity_at_reference(&self.terms, task, reference);
         let in_contact = self.latch.in_contact();
         let blocked = in_contact && config.latch.fade && config.latch.hold_friction;
-        for (i, friction) in config.friction.iter().enumerate() {
+        for (i, friction) in self.friction.iter().enumerate() {
             let direction = directions[i];
             let rests = abs(velocity[i]) < REST_SHARE * friction.band_rad_per_s;
             directions[i] = if friction.presliding_rad == 0.0 {

@@ -19,7 +19,7 @@
 //!
 //! Gears add dry friction in proportion to a torque, `L |tau|`: the load torque of the joint, or the torque of the motor. The
 //! motor torque is `tau = g +- S` at a load `g`; friction is then greater if the motor drives the load than if the load drives
-//! the motor.
+//! the motor. The stiffness of what yields in presliding does not depend on the load, so that `d` is in proportion to the dry friction.
 //!
 //! As printed, the inner branch of (3.2) is `S/delta (sign(v) v^2/delta + 2 v)`; at `|v| =
 //! delta` it has the value `3 S`, while the outer branch has the value `S`. With the opposite sign of the parabola,
@@ -30,6 +30,9 @@ use core::fmt;
 
 /// Maximum `load_coefficient`: with a greater coefficient, a torque at the output of the gear could hardly move it.
 pub const MAX_LOAD_COEFFICIENT: f64 = 0.5;
+
+/// Minimum ratio of the presliding distance at a load to the given one, so that it is positive.
+const MIN_DISTANCE_RATIO: f64 = 1e-6;
 
 /// Relative error of torques after scaling.
 const ROUNDING: f64 = 1e-12;
@@ -67,7 +70,7 @@ pub struct Friction {
     /// `delta`, half-width of the band of (3.2) in which friction is a parabola \[rad/s\], positive.
     pub band_rad_per_s: f64,
     /// `d`, distance over which dry friction reverses after a reversal of motion \[rad\]; zero: dry friction has the direction of
-    /// the velocity.
+    /// the velocity. Where friction depends on the load: at `coulomb_at_nm`.
     pub presliding_rad: f64,
     /// `L`, dry friction that a torque on the gear adds, per torque, 0 to 0.5; zero: friction does not depend on the load.
     pub load_coefficient: f64,
@@ -205,8 +208,8 @@ impl Friction {
     }
 
     /// Returns the sliding friction while the joint carries `load_nm` \[N m\]: the dry part is the mean of both directions, and
-    /// half of their difference is added to the offset, as for the viscous part to its asymmetry. The Stribeck effect is in
-    /// proportion to the dry part, except for its offset.
+    /// half of their difference is added to the offset, as for the viscous part to its asymmetry. The Stribeck effect, except for its
+    /// offset, and the presliding distance are in proportion to the dry part.
     #[inline]
     pub fn at_load(&self, load_nm: f64) -> Friction {
         let (share, size_nm) = (self.load_coefficient, abs(load_nm));
@@ -238,6 +241,7 @@ impl Friction {
             coulomb_nm,
             breakaway_nm: self.breakaway_nm * ratio,
             offset_nm: self.offset_nm + offset_nm,
+            presliding_rad: self.presliding_rad * ratio.max(MIN_DISTANCE_RATIO),
             ..*self
         }
     }

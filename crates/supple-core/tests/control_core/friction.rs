@@ -350,6 +350,38 @@ fn scaled_dry_friction_is_scaled_without_load() {
     }
 }
 
+/// What yields in presliding has a stiffness that does not depend on the load: friction starts to reverse with the same slope.
+#[test]
+fn presliding_has_the_same_stiffness_at_every_load() {
+    let law = Friction {
+        presliding_rad: 1e-3,
+        ..WITH_LOAD
+    };
+    let stiffness_nm_per_rad = |load_nm: f64| {
+        let loaded = law.at_load(load_nm);
+        let travel_rad = 1e-9;
+        loaded.coulomb_nm * (1.0 + loaded.direction_after(-1.0, travel_rad)) / travel_rad
+    };
+    let expected = stiffness_nm_per_rad(0.0);
+    for load_nm in [-12.0, -3.0, 0.7, 5.0, 30.0] {
+        close(stiffness_nm_per_rad(load_nm) / expected, 1.0, 1e-6);
+    }
+    assert_eq!(
+        WITH_DIP.at_load(9.0).presliding_rad,
+        WITH_DIP.presliding_rad
+    );
+    // Without a load this one has no dry friction; its direction is still a number.
+    let none = Friction {
+        coulomb_nm: 0.4,
+        breakaway_nm: 0.4,
+        ..law
+    };
+    assert_eq!(none.at_load(0.0).coulomb_nm, 0.0);
+    let direction = |travel_rad: f64| none.at_load(0.0).direction_after(0.3, travel_rad);
+    close(direction(0.0), 0.3, 1e-12);
+    close(direction(-1e-3), -1.0, 1e-12);
+}
+
 const WITH_TRAVEL: Friction = Friction {
     presliding_rad: 1e-3,
     ..WITH_DIP

@@ -360,7 +360,7 @@ fn learning_friction_keeps_the_springs() {
 }
 
 /// A motion in which every joint reverses, of an arm whose dry friction reverses over `travel_rad`; zero: with the velocity. Gears add
-/// the share `load.0` of the torque `load.1`.
+/// the share `load.0` of the torque `load.1`; the distance is then in proportion to the dry friction.
 fn reversing_motion(config: &Config<4>, travel_rad: f64, load: (f64, LoadTorque)) -> Motion {
     let (rate_hz, samples) = (200.0, 12_000);
     let angle = |i: usize, j: usize| {
@@ -398,14 +398,13 @@ fn reversing_motion(config: &Config<4>, travel_rad: f64, load: (f64, LoadTorque)
                 load_torque: load.1,
                 ..config.friction[j]
             };
+            let loaded = law.at_load(torque[j]);
             direction[j] = match travel_rad > 0.0 {
-                true => law.direction_after(direction[j], qd[j] / rate_hz),
-                false => law.direction(qd[j]),
+                true => loaded.direction_after(direction[j], qd[j] / rate_hz),
+                false => loaded.direction(qd[j]),
             };
-            let friction = law
-                .at_load(torque[j])
-                .torque_in_direction_nm(qd[j], direction[j], 1.0);
-            motion.tau[(i, j)] = torque[j] + friction;
+            motion.tau[(i, j)] =
+                torque[j] + loaded.torque_in_direction_nm(qd[j], direction[j], 1.0);
         }
     }
     motion
@@ -415,7 +414,7 @@ fn reversing_motion(config: &Config<4>, travel_rad: f64, load: (f64, LoadTorque)
 #[test]
 fn the_presliding_distance_is_found_if_the_arm_has_one() {
     let config = wam4();
-    for travel_rad in [0.0, 1e-3] {
+    for travel_rad in [0.0, 1e-3, 1.2e-3] {
         let motions = [reversing_motion(
             &config,
             travel_rad,
@@ -427,12 +426,15 @@ fn the_presliding_distance_is_found_if_the_arm_has_one() {
         };
         let found = fit(&config.arm, &motions, &ALL, &options).unwrap();
         let travels = presliding_rad(&found, &motions).unwrap();
-        assert_eq!(travels, vec![travel_rad; 4]);
+        for found_rad in travels {
+            let error_rad = (found_rad - travel_rad).abs();
+            assert!(error_rad <= 0.03 * travel_rad, "{found_rad} {travel_rad}");
+        }
     }
 }
 
-/// Friction by load reverses over the same distance. Shoulder and elbow carry several newton metres: their gears add 0.5 to 4 N m to
-/// dry friction of 0.6 to 2 N m.
+/// Friction by load reverses with the same stiffness, over a distance in proportion to it. Shoulder and elbow carry several newton metres:
+/// their gears add 0.5 to 4 N m to dry friction of 0.6 to 2 N m.
 #[test]
 fn the_presliding_distance_is_that_of_all_dry_friction() {
     let config = wam4();
@@ -453,6 +455,17 @@ fn the_presliding_distance_is_that_of_all_dry_friction() {
         };
         let found = fit(&config.arm, &motions, &ALL, &options).unwrap();
         let travels = presliding_rad(&found, &motions).unwrap();
-        assert_eq!(travels, vec![travel_rad; 4], "{load_torque:?}");
+        let friction = found.friction();
+        for j in ALL {
+            let of_arm = Friction {
+                presliding_rad: travel_rad,
+                load_coefficient: 0.2,
+                load_torque,
+                ..config.friction[j]
+            };
+            let expected_rad = of_arm.at_load(friction[j].coulomb_at_nm).presliding_rad;
+            let ratio = travels[j] / expected_rad;
+            assert!((ratio - 1.0).abs() < 0.1, "{load_torque:?} {j}: {ratio}");
+        }
     }
 }
