@@ -120,6 +120,7 @@ fn config<const N: usize>(arm: Arm<N>) -> Config<N> {
             inertia,
             friction_velocity: FrictionVelocity::Reference,
             measured_stribeck: false,
+            presliding_share: 1.0,
             inertial_feedforward: true,
             nullspace_damping_nm_s_per_rad: 0.5,
         },

@@ -158,6 +158,10 @@ pub struct Law {
     /// with little viscous friction `V` stick and slip. The feed-forward then falls with the speed as well. Because of the average, joints
     /// with an inertia below `k - V` times the averaging time still stick and slip.
     pub measured_stribeck: bool,
+    /// Share of a joint's presliding distance over which its dry friction reverses along the reference, above 0, at most 1. The joint itself
+    /// starts later than its reference and travels less: with 1, one that moves by a few presliding distances does not get its friction,
+    /// and rests. With less, joints that move further get theirs too early.
+    pub presliding_share: f64,
     /// Adds `M Xo''`, which (3.3) does not contain.
     pub inertial_feedforward: bool,
     /// Damping of null-space motion if more than three joints are active \[N m s/rad\], zero or
@@ -174,6 +178,7 @@ impl Law {
             inertia: ApparentInertia::Own,
             friction_velocity: FrictionVelocity::Measured,
             measured_stribeck: false,
+            presliding_share: 1.0,
             inertial_feedforward: false,
             nullspace_damping_nm_s_per_rad: 0.0,
         }

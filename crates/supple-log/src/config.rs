@@ -253,6 +253,7 @@ mod tests {
         ));
         config.law.friction_velocity = FrictionVelocity::Measured;
         config.law.measured_stribeck = true;
+        config.law.presliding_share = 1.0 / 3.0;
         config.law.inertial_feedforward = false;
         config.latch.fade = false;
         config.friction[2].offset_nm = f64::from_bits(0x3fb9_9999_9999_999b);

@@ -165,6 +165,9 @@ pub(crate) struct LawDef {
     /// Older logs lack this entry.
     #[serde(default)]
     measured_stribeck: bool,
+    /// Older logs lack this entry, too.
+    #[serde(default = "whole")]
+    presliding_share: f64,
     inertial_feedforward: bool,
     nullspace_damping_nm_s_per_rad: f64,
     #[serde(with = "ApparentInertiaDef")]
@@ -193,6 +196,10 @@ pub(crate) struct ContactLatchDef {
     false_alarms_per_hour: f64,
     #[serde(default = "infinite")]
     release_s: f64,
+}
+
+fn whole() -> f64 {
+    1.0
 }
 
 fn infinite() -> f64 {

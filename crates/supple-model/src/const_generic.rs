@@ -240,6 +240,7 @@ impl Description {
                 FrictionVelocity::Measured => config::FrictionVelocity::Measured,
             },
             measured_stribeck: law.measured_stribeck,
+            presliding_share: law.presliding_share,
             inertial_feedforward: law.inertial_feedforward,
             nullspace_damping_nm_s_per_rad: law.nullspace_damping_nm_s_per_rad,
         }

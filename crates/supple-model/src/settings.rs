@@ -457,6 +457,9 @@ pub struct LawSettings {
     /// Evaluates the Stribeck effect at the measured velocity, averaged over 50 ms, instead of at that of the reference: fewer joints with
     /// little viscous friction stick and slip at low gains. Default false.
     pub measured_stribeck: bool,
+    /// Share of `presliding_rad` over which dry friction turns round along the reference, above 0, at most 1: less than 1 for joints that move
+    /// by a few times that travel, which otherwise rest. Default 1.
+    pub presliding_share: f64,
     /// Adds `M Xo''`. Default true.
     pub inertial_feedforward: bool,
     /// Damping of null-space motion if more than three joints are active (N m s/rad), zero or more. Default 2.
@@ -581,6 +584,7 @@ impl Default for LawSettings {
             apparent_inertia_kg: None,
             friction_velocity: FrictionVelocity::Reference,
             measured_stribeck: false,
+            presliding_share: 1.0,
             inertial_feedforward: true,
             nullspace_damping_nm_s_per_rad: 2.0,
         }

@@ -74,7 +74,10 @@ impl<const N: usize> State<N> {
             } else if rests {
                 direction * exp(-elapsed_s / REST_S)
             } else {
-                friction.direction_after(direction, velocity[i] * elapsed_s)
+                friction.direction_after(
+                    direction,
+                    velocity[i] * elapsed_s / config.law.presliding_share,
+                )
             };
         }
         self.dry_direction = Some(directions);

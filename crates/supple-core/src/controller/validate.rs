@@ -228,6 +228,13 @@ pub(super) fn validate<const N: usize>(config: &Config<N>) -> Result<(), ConfigE
         "nullspace_damping_nm_s_per_rad",
         law.nullspace_damping_nm_s_per_rad,
     )?;
+    check(
+        law.presliding_share > 0.0 && law.presliding_share <= 1.0,
+        "presliding_share",
+        None,
+        law.presliding_share,
+        "above 0, at most 1",
+    )?;
     check_positive("observer_rad_per_s", latch.observer_rad_per_s)?;
     check_positive("threshold_n", latch.threshold_n)?;
     check_not_negative("friction_error", latch.friction_error)?;

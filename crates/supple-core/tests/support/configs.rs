@@ -106,6 +106,7 @@ fn config<const N: usize>(
             inertia: ApparentInertia::Own,
             friction_velocity: FrictionVelocity::Reference,
             measured_stribeck: false,
+            presliding_share: 1.0,
             inertial_feedforward: true,
             nullspace_damping_nm_s_per_rad: 2.0,
         },

@@ -119,6 +119,11 @@ fn fractions_must_be_from_0_to_1() {
         config.latch.contact_share = value;
         assert!(Controller::new(config).is_ok());
     }
+    for value in [0.0, -0.5, 1.000_000_1, f64::NAN] {
+        refused("presliding_share", None, value, |config| {
+            config.law.presliding_share = value;
+        });
+    }
 }
 
 #[test]

@@ -21,6 +21,7 @@ fn whole_law() -> Law {
         inertia: ApparentInertia::Chosen(Matrix3::from_diagonal_element(3.0)),
         friction_velocity: FrictionVelocity::Reference,
         measured_stribeck: false,
+        presliding_share: 1.0,
         inertial_feedforward: true,
         nullspace_damping_nm_s_per_rad: 2.0,
     }
