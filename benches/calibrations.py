@@ -57,7 +57,7 @@ def row(options, arm, seed):
     folder = options.out / f"{arm}-{seed}"
     plant = ["--arm", arm, "--seed", str(seed), "--yes", "--plant", options.plant, "--plant-options", options.plant_options]
     if options.plant == "emu":
-        plant += ["--virtual-time", "--no-realtime", "--prefix", f"calibrations_{arm}_"]
+        plant += ["--virtual-time", "--no-realtime", "--prefix", f"calibrations_{arm}_{seed}_"]
     start = ["--start-error", "0.15,0.5,1"]
     failed = run(program, ["calibrate", *plant, *start, "--out", str(folder)], folder, options.limit_s)
     if failed:
@@ -108,6 +108,7 @@ def main():
     parser.add_argument("--no-hold", dest="hold", action="store_false", help="leave out the check of holding")
     parser.add_argument("--programs", type=pathlib.Path, default=pathlib.Path("target/release"), metavar="DIR")
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/calibrations"), metavar="DIR")
+    parser.add_argument("--jobs", type=int, default=2, metavar="N", help="calibrations at a time")
     parser.add_argument("--limit-s", type=float, default=1800.0, help="time limit of each command [s]")
     options = parser.parse_args()
     if not (options.programs / "supple").exists():
@@ -115,13 +116,10 @@ def main():
     options.out.mkdir(parents=True, exist_ok=True)
     print(HEADER, flush=True)
 
-    def of_arm(arm):
-        for seed in options.seeds:
-            print(row(options, arm, seed), flush=True)
-
-    with concurrent.futures.ThreadPoolExecutor() as pool:
-        for done in [pool.submit(of_arm, arm) for arm in options.arms.split(",")]:
-            done.result()
+    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        rows = [pool.submit(row, options, arm, seed) for arm in options.arms.split(",") for seed in options.seeds]
+        for done in rows:
+            print(done.result(), flush=True)
 
 
 if __name__ == "__main__":
