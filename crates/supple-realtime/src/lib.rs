@@ -33,6 +33,7 @@ pub use private_folder::{
     PrivateFolderError, create_private_folder, open_private_folder, runtime_folder,
 };
 pub use processor::run_on_supported_processor;
+pub use schedule::{allowed_processors, bind_process};
 pub use spin::spin_duration;
 pub use stop::{Stop, StopError, die_with_parent, ignore_file_size_and_tty_signals};
 pub use supported::{forget_support, listen_for_support, support_is_declared};

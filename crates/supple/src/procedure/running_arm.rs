@@ -89,7 +89,7 @@ impl<const N: usize> RunningArm<N> {
             description: description.clone(),
             domain: domain.clone(),
             plan: Plan::new(args, description, domain, None)?,
-            children: ChildProcesses::default(),
+            children: ChildProcesses::new(domain, args.virtual_time),
             reader: TelemetryReader::for_log(domain).map_err(Failure::system)?,
             session: OperatorSession::for_system(domain)?,
             prefix: domain.prefix().to_owned(),

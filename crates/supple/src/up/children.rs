@@ -1,6 +1,7 @@
 //! Child processes of a system: starts, supervises and terminates the programs that are installed beside this one.
 
 use super::plan::{CONTROLLER, Program};
+use super::shared_processor::SharedProcessor;
 use core::time::Duration;
 use rustix::fs::{FlockOperation, flock};
 use rustix::io::Errno;
@@ -31,16 +32,31 @@ const DECLARE_DELAY: Duration = Duration::from_millis(500);
 const POLL_INTERVAL: Duration = Duration::from_millis(5);
 
 /// The child processes; dropping this value kills those that still run.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct ChildProcesses {
     running: Vec<(&'static str, Child)>,
     /// Programs that have exited, with their exit status.
     ended: Vec<(&'static str, ExitStatus)>,
     /// File to which the processes write their standard error; without it, they use that of this process.
     reports: Option<File>,
+    /// Processor on which all of them run; without it, on any.
+    processor: Option<SharedProcessor>,
 }
 
 impl ChildProcesses {
+    /// Creates the processes of a system, of which none runs yet. In virtual time they run on one processor.
+    pub fn new(domain: &Domain, virtual_time: bool) -> ChildProcesses {
+        ChildProcesses {
+            running: Vec::new(),
+            ended: Vec::new(),
+            reports: None,
+            processor: match virtual_time {
+                true => SharedProcessor::take(domain),
+                false => None,
+            },
+        }
+    }
+
     /// Redirects the standard error of all processes that are started later to a file.
     pub fn report_to(&mut self, file: File) {
         self.reports = Some(file);
@@ -69,6 +85,9 @@ impl ChildProcesses {
             .process_group(0)
             .spawn()
             .map_err(|error| Failure::file("start", &program, error))?;
+        if let Some(processor) = &self.processor {
+            processor.bind(&child);
+        }
         if *name == CONTROLLER {
             interrupt::forward_interrupts_to(&child);
         }

@@ -11,6 +11,7 @@ mod children;
 mod outputs;
 mod plan;
 mod recorder;
+mod shared_processor;
 mod start_up;
 mod statistics;
 mod status_line;

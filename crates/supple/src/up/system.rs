@@ -78,7 +78,7 @@ impl<'a, const N: usize> System<'a, N> {
             // Create readers before writers, so that no message is missed.
             reader: TelemetryReader::for_log(domain).map_err(Failure::system)?,
             session: OperatorSession::for_system(domain)?,
-            children: ChildProcesses::default(),
+            children: ChildProcesses::new(domain, args.virtual_time),
             statistics: RunStatistics::default(),
             line: StatusLine::new(args.json, plan.has_pendant(args.plant), period_s),
             seen: None,
