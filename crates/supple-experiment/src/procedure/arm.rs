@@ -20,6 +20,9 @@ pub trait MotionArm<const N: usize> {
     /// If the controller cannot be started with this model, or the drives do not become active.
     fn load(&mut self, model: &Description) -> Result<(), Self::Error>;
 
+    /// Returns the reason of the controller if this error is a refused request.
+    fn refusal(error: &Self::Error) -> Option<&str>;
+
     /// Returns the present joint angles \[rad\].
     ///
     /// # Errors

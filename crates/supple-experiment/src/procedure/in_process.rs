@@ -238,6 +238,13 @@ impl<const N: usize> MotionArm<N> for InProcessArm<N> {
         self.settle("holding still", super::HOLD_REMEDY)
     }
 
+    fn refusal(error: &ProcedureError) -> Option<&str> {
+        match error {
+            ProcedureError::Experiment(ExperimentError::Refused { reason, .. }) => Some(reason),
+            _ => None,
+        }
+    }
+
     fn position_rad(&mut self) -> Result<Vector<N>, ProcedureError> {
         let wiring = self.wiring;
         let rig = self.rig()?;

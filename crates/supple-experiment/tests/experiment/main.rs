@@ -1,5 +1,6 @@
 //! Experiments and their evaluation, without a system of processes.
 
+mod hold_check;
 mod mismatch;
 mod moves;
 mod teaching;

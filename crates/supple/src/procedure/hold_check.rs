@@ -144,9 +144,9 @@ fn in_words(found: &HoldCheck) -> String {
         },
     );
     lines.push(format!(
-        "{}: {worst}; {} poses ended by a fault",
+        "{}: {worst}; {} poses not held to the end",
         found.arm,
-        found.faults()
+        found.ended()
     ));
     if let Some(errors) = found.worst_error_rad() {
         let of_joint = |joint: usize| {

@@ -501,6 +501,13 @@ impl<const N: usize> MotionArm<N> for RunningArm<N> {
         self.activate(unless_idle_since)
     }
 
+    fn refusal(error: &Failure) -> Option<&str> {
+        match error {
+            Failure::Refused { reason } => Some(reason),
+            _ => None,
+        }
+    }
+
     fn motors(&mut self) -> Vec<MotorConstants> {
         match self.description.bus() {
             // Without the file, as of an older program on the bus, the calibration lacks these numbers only.

@@ -37,11 +37,11 @@ pub struct HoldCheckOptions<const N: usize> {
 pub struct HeldPose {
     /// Pose \[rad\].
     pub position_rad: Vec<f64>,
-    /// Distance by which the tip drifts in gravity hold, by the encoders \[m\]; `None` if a fault ended it.
+    /// Distance by which the tip drifts in gravity hold, by the encoders \[m\]; `None` if it was not held to the end.
     pub tip_drift_m: Option<f64>,
-    /// Distance of each joint from the pose under stiffness, at the end \[rad\]; empty if a fault ended it.
+    /// Distance of each joint from the pose under stiffness, at the end \[rad\]; empty if it was not held to the end.
     pub joint_error_rad: Vec<f64>,
-    /// The fault that ended the pose.
+    /// The fault that ended the pose, or why the controller refused it.
     pub ended: Option<String>,
 }
 
@@ -79,8 +79,8 @@ impl HoldCheck {
         (0..self.joints.len()).map(of_joint).collect()
     }
 
-    /// Number of poses that a fault ended.
-    pub fn faults(&self) -> usize {
+    /// Number of poses that were not held to the end.
+    pub fn ended(&self) -> usize {
         self.poses
             .iter()
             .filter(|pose| pose.ended.is_some())
@@ -93,8 +93,8 @@ impl HoldCheck {
 /// `-stiffness.mcap`.
 ///
 /// # Errors
-/// [`ProcedureError`] with the remedy, and the errors of the arm. A fault in a pose ends this pose only; an error if it ended all of
-/// them.
+/// [`ProcedureError`] with the remedy, and the errors of the arm. A fault or a refusal in a pose ends this pose only; an error if all of
+/// them ended so.
 pub fn check_hold<const N: usize, A: MotionArm<N>>(
     arm: &mut A,
     start: &Description,
@@ -225,13 +225,24 @@ impl<const N: usize, A: MotionArm<N>> Run<'_, N, A> {
         Ok(steps)
     }
 
-    /// Performs steps of which the last one is recorded; returns its data, or the fault that ended one of them.
+    /// Performs steps of which the last one is recorded; returns its data, or the fault that ended one of them, or why one was refused even
+    /// with slower moves.
     fn held_motion(
         &mut self,
         name: &str,
         steps: &[Step<N>],
     ) -> Result<Result<Motion, String>, A::Error> {
-        let performed = self.arm.perform(name, steps)?;
+        let mut performed = self.arm.perform(name, steps);
+        if performed.as_ref().is_err_and(|e| A::refusal(e).is_some()) {
+            performed = self.arm.perform(name, &slower(steps));
+        }
+        let performed = match performed {
+            Ok(performed) => performed,
+            Err(error) => {
+                let refusal = A::refusal(&error).map(str::to_owned);
+                return refusal.map(Err).ok_or(error);
+            }
+        };
         self.progress.moved_s += performed.moved_s;
         if let Some(stopped) = performed.stopped {
             self.arm.recover()?;
@@ -249,6 +260,18 @@ fn beyond(confirmed: Option<&Sweep>, way: Sweep) -> Option<Sweep> {
         Some(confirmed) => Some(confirmed.clone().with(way)),
         None => Some(way),
     }
+}
+
+/// Returns steps whose moves take twice the time.
+fn slower<const N: usize>(steps: &[Step<N>]) -> Vec<Step<N>> {
+    let mut steps = steps.to_vec();
+    for step in &mut steps {
+        if let Request::Move { duration_s, .. } = &mut step.request {
+            *duration_s *= 2.0;
+            step.duration_s *= 2.0;
+        }
+    }
+    steps
 }
 
 /// Returns the target of a move.
